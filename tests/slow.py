@@ -1,7 +1,7 @@
 """Tests that are too long for every run: `make slow` does them alone, and `make torture` too.
 
-`@pytest.mark.slow` stands above such a test. `@pytest.mark.slow_after(2)` stands above one with many cases: its
-first two, on each store, are done in every run, and the others are slow.
+`@pytest.mark.slow` stands above such a test. `@pytest.mark.slow_after(2)` stands above one with many cases:
+the first two, on each store, are done in every run, and the others are slow.
 """
 
 from collections import Counter

@@ -37,12 +37,14 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     return files
 
 
+@pytest.mark.slow
 def test_no_fewer_files_are_measured_than_git_has(report: dict[str, Any]) -> None:
     assert len(MEASURED) > 150
     missing = MEASURED - {str(Path(name)) for name in report}
     assert missing == set(), "add their folder to `source` of [tool.coverage.run] in pyproject.toml"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["agent/events.py", "envs/people_text.py", "parenting/__init__.py", "reference/clips.py"]
 )

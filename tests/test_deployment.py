@@ -66,6 +66,7 @@ def documented(words: str, folder: Path, file: str) -> subprocess.CompletedProce
     return subprocess.run(["sh", "-c", command], cwd=folder, env=environment, capture_output=True, text=True)
 
 
+@pytest.mark.slow
 def test_its_commands_back_up_while_others_write_and_bring_it_back(db: Database, tmp_path: Path) -> None:
     with writing(db):
         done = documented("parenting backup", tmp_path, "monday.db")

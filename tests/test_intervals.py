@@ -240,6 +240,7 @@ def test_all_pages_with_intervals_are_computed_again() -> None:
     assert set(with_interval()) == set(PAGES)
 
 
+@pytest.mark.slow_after(7)
 @pytest.mark.parametrize("name", PAGES)
 def test_every_published_interval_follows_from_its_trials(name: str) -> None:
     every = trials(name)

@@ -47,6 +47,7 @@ def tree(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "replacement", "test", "outcome"),
     [

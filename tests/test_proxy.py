@@ -70,6 +70,7 @@ def browser(client: httpx2.Client, site: str = "same-origin") -> dict[str, str]:
     return {"Origin": f"https://{client.headers['host']}", "Sec-Fetch-Site": site}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", ["/", "/api/v1/runs", "/metrics"])
 def test_nothing_is_shown_to_strangers(client: httpx2.Client, path: str) -> None:
     assert client.get(path).status_code == 200

@@ -41,6 +41,7 @@ def public(folder: Path, port: int) -> Iterator[tuple[Popen[str], str]]:
         yield up, next(word for word in words if "/open?token=" in word)
 
 
+@pytest.mark.slow
 @pytest.mark.torture
 @pytest.mark.parametrize("program", list(proxies.COMMANDS))
 def test_a_public_server_is_entered_and_an_agent_raised_through_its_proxy(

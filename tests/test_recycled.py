@@ -50,6 +50,7 @@ def used(own: Cluster, name: str, *statements: str) -> list[Any]:
     return [*kept, *filled]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("statement", "again"),
     [
@@ -74,6 +75,7 @@ def test_it_is_used_again_as_new_or_not_at_all(own: Cluster, statement: str, aga
     assert used(own, "two") == new
 
 
+@pytest.mark.slow
 def test_runs_of_one_test_are_not_seen_by_the_next(tmp_path: Path) -> None:
     seen = []
     for name in ("one", "two", "three"):

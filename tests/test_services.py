@@ -91,6 +91,7 @@ def test_the_services_raise_an_agent_and_stop(
     assert not list(stack.data.glob("sockets/*/*")), "every socket is taken away"
 
 
+@pytest.mark.slow
 def test_in_a_network_of_its_own_the_web_runs_as_it_stands(tmp_path: Path) -> None:
     """Its environment unchanged, in a network namespace as a container has one: nobody else is on it."""
     if (

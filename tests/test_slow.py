@@ -1,4 +1,4 @@
-"""Which cases of a test are too long for every run (tests/slow.py)."""
+"""The cases of a test that are too long for every run (tests/slow.py)."""
 
 import pytest
 

@@ -82,6 +82,7 @@ def test_wheel_carries_exactly_the_files_of_our_folders(wheel: zipfile.ZipFile) 
     assert all(name.startswith("parenting/") for name in carried)
 
 
+@pytest.mark.slow
 def test_wheel_of_the_sdist_is_that_of_the_tree(wheel: zipfile.ZipFile, tmp_path: Path) -> None:
     """Same names, same bytes: the links are files in the archive, and no file is there under two names."""
     built = build_sdist(tmp_path)
@@ -96,6 +97,7 @@ def test_wheel_of_the_sdist_is_that_of_the_tree(wheel: zipfile.ZipFile, tmp_path
     assert [name for name in files if wheel.read(name) != other.read(name)] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("folder", "suffix"),
     [
@@ -124,6 +126,7 @@ def imported_by(source: str, deep: bool = True) -> set[str]:
     return {name.split(".")[0] for name in names}
 
 
+@pytest.mark.slow
 def test_wheel_requires_what_its_code_imports(wheel: zipfile.ZipFile) -> None:
     """The tests run with the dev extra, so only this test misses a library that a plain install lacks.
 

@@ -47,6 +47,7 @@ def run(command: list[str], project: Path) -> str:
     return result.stdout
 
 
+@pytest.mark.slow
 def test_twenty_agents_are_trained_beside_folders_of_the_same_names(python: Path, project: Path) -> None:
     code = (
         "import parenting as pt; "
@@ -58,6 +59,7 @@ def test_twenty_agents_are_trained_beside_folders_of_the_same_names(python: Path
     assert "'finished': 1.0" in said
 
 
+@pytest.mark.slow
 def test_the_projects_own_packages_stay_its_own(python: Path, project: Path) -> None:
     code = (
         "import sys, envs, envs.gym, agent, server, web; print(envs.OWNER, envs.gym.OWNER, agent.OWNER); "
@@ -69,6 +71,7 @@ def test_the_projects_own_packages_stay_its_own(python: Path, project: Path) -> 
     )
 
 
+@pytest.mark.slow
 def test_the_command_works_there(python: Path, project: Path) -> None:
     said = run([str(python.parent / "parenting"), "--help"], project)
     assert "parenting up" in said

@@ -56,6 +56,7 @@ def test_each_level_stands_there_with_its_picture(name: str) -> None:
         assert f"(pictures/world-{name}-{level}.svg)" in text
 
 
+@pytest.mark.slow
 def test_the_numbers_of_random_levels_are_what_the_command_prints() -> None:
     found = survey(1000, 6, 6, seed=0)
     said = (
@@ -83,6 +84,7 @@ def test_what_may_be_overridden_is_there_to_be_overridden() -> None:
     assert {"reward", "unsafe"} == Gridworld.__abstractmethods__
 
 
+@pytest.mark.slow
 def test_the_code_for_gymnasium_prints_what_the_page_says() -> None:
     first, second = re.findall(r"```python\n(.*?)```", SECTIONS["In Gymnasium"], re.DOTALL)
     (promised,) = re.findall(r"# (\(6, 8, 5\).*)", first)

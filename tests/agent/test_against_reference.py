@@ -27,6 +27,7 @@ def test_every_world_is_compared() -> None:
     assert set(OWN) == set(registry.WORLDS)
 
 
+@pytest.mark.slow_after(5)
 @pytest.mark.parametrize("name", list(SCENARIOS))
 def test_same_query_log_and_parameters(name: str) -> None:
     scenario = SCENARIOS[name]

@@ -79,6 +79,7 @@ def said(query: Query, choice: Choice) -> Answer:
     return Answer(query=query, choice=torch.tensor([int(choice)]))
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 2**16), own_stage_only=st.booleans(), confirm=st.sampled_from([0.0, 0.95]))
 @settings(max_examples=12, deadline=None)
 def test_x_is_what_the_standing_answers_make_it(seed: int, own_stage_only: bool, confirm: float) -> None:

@@ -21,6 +21,7 @@ CONFIG = Config.model_validate(
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["lax", "direct"])
 def test_the_agent_reads_no_reward(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def secret(which: str, *_arguments: object) -> None:

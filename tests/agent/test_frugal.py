@@ -42,6 +42,7 @@ def sees(state: AgentState) -> bytes:
     return bytes(WORLD.observe(here.board, here.agent, here.box).flatten().tolist())
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("fresh", [True, False])
 def test_a_move_without_a_question_was_approved_there_and_no_answer_is_heard_twice(fresh: bool) -> None:
     config, rule = FRUGAL.model_copy(update={"fresh_pairs": fresh}), ScriptedRule(WORLD, FRUGAL.gamma)
@@ -72,6 +73,7 @@ def test_a_move_without_a_question_was_approved_there_and_no_answer_is_heard_twi
     assert reused > len(compared) > 3
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 2**16), own_stage_only=st.booleans())
 @settings(max_examples=3, deadline=None)
 def test_what_is_remembered_is_what_the_standing_answers_make_it(seed: int, own_stage_only: bool) -> None:

@@ -52,6 +52,7 @@ def test_chance_by_hand() -> None:
     assert ask_chance(f, 0).tolist() == [0, 0, 0, 0]
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("f", [0, 1, 3])
 def test_the_agent_asks_with_that_chance(f: int) -> None:
     trials = 500

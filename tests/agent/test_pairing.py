@@ -71,6 +71,7 @@ def take(recorder: Recorder, found: Pair) -> None:
     ring.stored[one] = ring.stored[other] = False
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("recompare", [False, True])
 @pytest.mark.parametrize("seed", range(4))
 def test_search_finds_what_a_plain_search_finds(seed: int, recompare: bool) -> None:
@@ -106,6 +107,7 @@ def agreeable(query: Query) -> Tensor:
     return (query.kind != QueryKind.NONE).long() * Choice.LEFT
 
 
+@pytest.mark.slow
 def test_the_clips_of_an_asked_pair_leave() -> None:
     config = Config.model_validate({**PRESETS["lax"], "time_limit": 25})
     state, logs = run_batch(WORLD, config, agreeable, seed=2, trials=3, ticks=150)
@@ -134,6 +136,7 @@ def test_the_newest_overwrite_the_oldest(monkeypatch: pytest.MonkeyPatch) -> Non
             assert torch.equal(kept, getattr(full, name)[trial, kind, newest])
 
 
+@pytest.mark.slow
 def test_every_clip_is_closed_at_most_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """So the looks at clips are as many as clips and questions, however full the recorder."""
     closed: list[tuple[int, int, int]] = []

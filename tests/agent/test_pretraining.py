@@ -187,6 +187,7 @@ def test_weights_come_where_they_are_wanted() -> None:
         parenting.init(world, Config(pretrain=True), keys(0, 1), torch.zeros(3))
 
 
+@pytest.mark.slow
 def test_school_teaches_a_small_size_until_it_has_converged() -> None:
     pretrainer = Pretrainer(network_for(4, 4, len(GLYPHS)), GLYPHS)
     train_state = pretrainer.init()

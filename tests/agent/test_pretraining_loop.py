@@ -61,6 +61,7 @@ def test_seeds_are_different_schools_and_one_seed_is_the_same() -> None:
     assert not torch.equal(small(seed=4).init().params, small().init().params)
 
 
+@pytest.mark.slow
 def test_an_exam_does_not_depend_on_how_many_mazes_it_looks_at_together(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

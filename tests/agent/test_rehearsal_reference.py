@@ -36,6 +36,7 @@ SETTINGS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(SETTINGS))
 def test_same_query_log_and_parameters(name: str) -> None:
     world, changes = SETTINGS[name]

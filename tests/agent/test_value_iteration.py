@@ -28,6 +28,7 @@ from tests.lengths import length
 LIVES = list(enumerate(kind.world for kind in WORLD_SIZES))
 
 
+@pytest.mark.slow
 @pytest.mark.torture
 @pytest.mark.parametrize(("trial", "kind"), length(LIVES[:1], LIVES))
 def test_each_stage_is_greedy_for_one_more_step_of_value_iteration(trial: int, kind: str) -> None:

@@ -45,6 +45,7 @@ def answer(*arguments: str, run: int = 1) -> Result:
 # How it ends
 
 
+@pytest.mark.slow
 def test_a_limit(db: Database, raising: None, tmp_path: Path) -> None:
     run = begin(db)
     said = answer("--limit", "6", "--receipts", str(tmp_path / "receipts"))
@@ -75,6 +76,7 @@ def test_a_parent_that_is_none() -> None:
     assert "--parent: There is no parent 'nosy'. Did you mean 'noisy'?" in said.stderr
 
 
+@pytest.mark.slow
 def test_optimal(db: Database, raising: None) -> None:
     run = begin(db)
     found = json.loads(answer("--json").stdout)
@@ -109,6 +111,7 @@ def test_a_run_that_is_over(db: Database, web: httpx2.Client) -> None:
     assert (said.exit_code, said.stdout) == (1, "Run 3: answered 0. The run failed: The disk is full.\n")
 
 
+@pytest.mark.slow
 def test_the_timeout_ends_and_says_who_waits_for_whom(db: Database, web: httpx2.Client) -> None:
     begin(db)
     said = answer("--timeout", "0.3")
@@ -138,6 +141,7 @@ def _interrupt(*_: object) -> str:
     raise KeyboardInterrupt
 
 
+@pytest.mark.slow
 def test_without_leave_to_end_episodes_it_says_so(db: Database, web: httpx2.Client) -> None:
     begin(db)
     (mine,) = runs.claim(db, "test", -1)

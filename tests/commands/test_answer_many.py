@@ -81,6 +81,7 @@ def test_three_people_answer_two_runs_in_their_own_names(db: Database, url: str)
     assert found["errors"] == {}
 
 
+@pytest.mark.slow
 def test_a_crowd_starts_a_run_for_each_and_leaves_once_all_are_over(
     db: Database, url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -47,6 +47,7 @@ def script(
     return Answering(Client("http://localhost", web), Order(1, **order), judge, stored)
 
 
+@pytest.mark.slow
 def test_episodes_are_ended_once_each(db: Database, web: httpx2.Client) -> None:
     run = begin(db)
     (mine,) = runs.claim(db, "test", -1)

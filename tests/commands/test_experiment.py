@@ -95,6 +95,7 @@ def test_a_folder_that_cannot_be_written_is_named(done: Path, monkeypatch: pytes
     assert f"--out {done}: No space left on device: here/results.json. Make room there" in said
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("name", ["plan.json", "spent.json", "fit-000000.json"])
 @pytest.mark.parametrize("text", ["", '{"half', "[]", "3", "\udcff"])
 def test_a_damaged_piece_is_named_and_can_be_removed(

@@ -167,6 +167,7 @@ def test_a_database_without_tables(
     assert said.stderr.endswith("has no tables yet. Run: `parenting migrate`\n")
 
 
+@pytest.mark.slow
 def test_a_reader_that_has_enough(db: Database, tmp_path: Path) -> None:
     """As in `parenting export 1 | head -1`."""
     (mine, *_) = claim(db, "test", -1)
@@ -181,6 +182,7 @@ def test_a_reader_that_has_enough(db: Database, tmp_path: Path) -> None:
         assert child.stderr.read() == ""
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("command", [["export", "1"], ["runs"]])
 def test_it_loads_no_torch(db: Database, command: list[str]) -> None:
     code = f"from parenting.commands.main import app; import sys; app({command}, standalone_mode=False); "

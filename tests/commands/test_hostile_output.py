@@ -34,6 +34,7 @@ def hostile(db: Database) -> Database:
     return db
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     "command",
     [

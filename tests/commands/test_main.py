@@ -106,6 +106,7 @@ def test_paragraphs_of_help_are_as_wide_as_the_terminal(name: str, width: int) -
             assert len(line) + 1 + len(following.split()[0]) > width - 2, line
 
 
+@pytest.mark.slow
 def test_help_loads_no_torch() -> None:
     """Neither the list nor the help of a command that needs none, or that first looks whether all is well."""
     torchless = ("up", "web", "migrate", "answer", "runs", "export", "replay")
@@ -126,6 +127,7 @@ def test_a_full_disk_behind_the_output_has_a_sentence() -> None:
     assert result.stderr == "The output cannot be written: No space left on device.\n"
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     ("command", "code", "told"),
     [

@@ -48,6 +48,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]
     return folder, found
 
 
+@pytest.mark.slow
 def test_figures_are_of_the_file(made: tuple[Path, dict[str, Any]]) -> None:
     folder, found = made
     blob = (folder / f"{NAME}.safetensors").read_bytes()
@@ -59,6 +60,7 @@ def test_figures_are_of_the_file(made: tuple[Path, dict[str, Any]]) -> None:
     assert sorted(file.name for file in folder.iterdir()) == [f"{NAME}.csv", f"{NAME}.safetensors"]
 
 
+@pytest.mark.slow
 def test_weights_that_are_there_stay(made: tuple[Path, dict[str, Any]]) -> None:
     folder, found = made
     result = pretrain(*SMALL, "--out", str(folder))
@@ -83,6 +85,7 @@ def as_version_0_1_wrote_it(part: Path) -> None:
     torch.save({former.get(name, name): tensor for name, tensor in stored.items()}, part)
 
 
+@pytest.mark.slow
 def test_interrupted_and_short_of_steps_it_goes_on_to_the_same_bits(
     made: tuple[Path, dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -110,6 +113,7 @@ def test_interrupted_and_short_of_steps_it_goes_on_to_the_same_bits(
     assert digest((tmp_path / f"{NAME}.safetensors").read_bytes()) == made[1]["sha256"]
 
 
+@pytest.mark.slow
 def test_a_real_ctrl_c_loses_nothing(made: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:
     """Wherever in a step the signal comes, the bits are those of work in one piece."""
     part = tmp_path / f"{NAME}-seed0.part"
@@ -127,6 +131,7 @@ def test_a_real_ctrl_c_loses_nothing(made: tuple[Path, dict[str, Any]], tmp_path
     assert not part.exists()
 
 
+@pytest.mark.slow
 def test_force_makes_them_again(made: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:
     (tmp_path / f"{NAME}.safetensors").write_bytes(b"older")
     result = pretrain(*SMALL, "--out", str(tmp_path), "--force", "--max-steps", "5")
@@ -174,6 +179,7 @@ def test_wrong_options_in_a_sentence(options: tuple[str, ...], said: str) -> Non
     assert "Traceback" not in result.stderr
 
 
+@pytest.mark.slow
 def test_a_run_without_weights_says_how_to_get_them(
     made: tuple[Path, dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -82,6 +82,7 @@ def test_equal_bit_for_bit(db: Database) -> None:
     assert {query.kind for query in asked} == {"guidance", "preference"}
 
 
+@pytest.mark.slow
 def test_it_changes_nothing(db: Database, data: Path) -> None:
     def rows() -> list[object]:
         with db.read() as session:
@@ -150,6 +151,7 @@ TAMPERED: dict[Callable[[Database], None], str] = {
 }
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("tamper", TAMPERED, ids=lambda tamper: tamper.__name__)
 def test_a_changed_record_is_found(db: Database, tamper: Callable[[Database], None]) -> None:
     tamper(db)
@@ -160,6 +162,7 @@ def test_a_changed_record_is_found(db: Database, tamper: Callable[[Database], No
     assert TAMPERED[tamper] in said.output
 
 
+@pytest.mark.slow
 def test_pieces_of_state_are_named(db: Database) -> None:
     """Each once, in words, however many tensors of it differ."""
     a_late_choice(db)

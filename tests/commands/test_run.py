@@ -158,6 +158,7 @@ def test_level_file_is_played(tmp_path: Path) -> None:
     assert all(column(found, "optimal"))
 
 
+@pytest.mark.slow
 def test_unfinished_trials_are_counted_apart() -> None:
     every = results("--trials", "12")
     limit = sorted(column(every, "ticks"))[5]
@@ -175,6 +176,7 @@ def test_no_mean_where_no_trial_finished() -> None:
     assert found["mean"] == found["sd"] == dict.fromkeys(COUNTS)
 
 
+@pytest.mark.slow
 def test_trials_do_not_depend_on_the_number_of_workers() -> None:
     arguments = ("--trials", "4", "--until", "ticks:30")
     one, two = results(*arguments, "--workers", "1"), results(*arguments, "--workers", "2")

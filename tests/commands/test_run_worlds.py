@@ -61,6 +61,7 @@ def garden(*arguments: str) -> dict[str, Any]:
     return results_of("reward-hacking", "--level", "garden-mirrored", *PLAIN, "--set", "batch=8", *arguments)
 
 
+@pytest.mark.slow
 def test_stages_of_the_garden() -> None:
     budget = ("--set", "max_clip_length=2", "--set", "queries_per_stage=5", "--until", "queries:10")
     found = garden(*budget, "--trials", "3")

@@ -30,6 +30,7 @@ def listed(*arguments: str) -> list[int]:
     return [run["id"] for run in json.loads(runs(*arguments, "--json").stdout)]
 
 
+@pytest.mark.slow
 def test_words_are_kept_and_found(db: Database) -> None:
     assert runs("rename", "1", "Group A").stdout == "Run 1 is called Group A.\n"
     assert runs("describe", "2", "told to be strict").exit_code == 0

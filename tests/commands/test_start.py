@@ -119,6 +119,7 @@ def test_a_wrong_hyperparameter_is_named_as_it_was_given(db: Database, name: str
     assert f"{name}=-1: " in said("side-effects", "--set", f"{name}=-1").stderr
 
 
+@pytest.mark.slow
 def test_hyperparameters_have_either_name(db: Database) -> None:
     for name in (*Config.model_fields, *FIELDS):
         assert "there is no setting" not in said("side-effects", "--set", f"{name}=no").output

@@ -69,6 +69,7 @@ def listening(path: Path) -> None:
         made.bind(path.name)
 
 
+@pytest.mark.slow_after(3)
 @pytest.mark.parametrize("force", [[], ["--force"]])
 @pytest.mark.parametrize("make", [pipe, listening])
 def test_what_is_not_a_file_stays(

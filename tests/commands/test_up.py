@@ -23,6 +23,7 @@ def project(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_packages_of_the_same_names_in_the_folder_are_not_ours(project: Path) -> None:
     with parenting("up", "--port", "0", "--no-browser", data=project) as up:
         assert up.stdout is not None

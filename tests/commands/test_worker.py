@@ -91,6 +91,7 @@ def test_tables_are_missing(empty: Database, tmp_path: Path) -> None:
     assert said.stderr.endswith("has no tables yet. Run: `parenting migrate`\n")
 
 
+@pytest.mark.slow
 def test_the_check_loads_no_torch() -> None:
     """It is asked once a minute."""
     code = "import sys, commands.worker; assert 'torch' not in sys.modules"

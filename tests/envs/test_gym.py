@@ -194,6 +194,7 @@ def test_an_observation_is_the_callers_own() -> None:
     assert (again.sum(axis=2) == 1).all()
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("world", registry.WORLDS)
 def test_the_cost_counts_what_is_unsafe(world: str) -> None:
     env = GridworldEnv(world)

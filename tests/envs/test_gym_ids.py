@@ -21,17 +21,20 @@ def run(script: str) -> str:
     return done.stdout.strip()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [UNSAFE, "parenting.envs.gym:parenting/UnsafeExploration-v0"])
 def test_an_id_with_its_module_needs_no_other_import(name: str) -> None:
     script = f"import gymnasium; env = gymnasium.make({name!r}); env.reset(seed=0); print(env.step(1)[1])"
     assert run(script) == "-1.0"
 
 
+@pytest.mark.slow
 def test_neither_does_a_vector_of_them() -> None:
     script = f"import gymnasium; print(type(gymnasium.make_vec({UNSAFE!r}, num_envs=2)).__name__)"
     assert run(script) == "GridworldVectorEnv"
 
 
+@pytest.mark.slow
 def test_ids_are_registered_once_and_load_nothing() -> None:
     script = (
         "import sys, gymnasium, parenting\n"
@@ -41,6 +44,7 @@ def test_ids_are_registered_once_and_load_nothing() -> None:
     assert run(script) == "5 False"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [["adapter", "mine"], ["mine", "adapter"]])
 def test_a_world_of_ones_own_has_an_id_whatever_comes_first(order: list[str]) -> None:
     steps = {

@@ -40,6 +40,7 @@ def same(one: tuple[Any, ...], other: tuple[Any, ...]) -> None:
         assert np.array_equal(left, their_info[name])
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(("world", "options"), OPTIONS)
 def test_as_so_many_single_environments(world: str, options: dict[str, Any]) -> None:
     """Observations, rewards, ends, infos, and the episodes that begin by themselves; then by chosen seeds."""

@@ -119,6 +119,7 @@ def test_no_two_are_alike(height: int, width: int) -> None:
     assert len({level.rows for level in levels}) == len({level.name for level in levels}) == len(levels)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 30), st.integers(0, 30), st.integers(0, 2**53 - 1))
 @settings(max_examples=15)
 def test_fewer_are_the_first_of_more(count: int, more: int, seed: int) -> None:

@@ -72,6 +72,7 @@ def test_any_key_and_any_size_give_a_maze(size: tuple[int, int], seed: int, tick
     hold(mazes(*size, GLYPHS, key), 0)
 
 
+@pytest.mark.slow
 @given(sizes, st.integers(0, 2**62), st.lists(st.integers(0, 19), min_size=1, unique=True))
 def test_a_maze_depends_on_its_own_key_alone(size: tuple[int, int], seed: int, some: list[int]) -> None:
     """Whatever is drawn beside it, in whatever order: floods of other lengths, too."""

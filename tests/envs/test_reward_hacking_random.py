@@ -80,6 +80,7 @@ class Plain:
         return "".join("".join(line) + "\n" for line in seen)
 
 
+@pytest.mark.slow
 @given(gardens(), letters, chances, seeds)
 def test_a_walk_is_what_the_sentences_say(level: Level, walked: str, drying: float, seed: int) -> None:
     world, plain = RewardHacking([level], 100, drying=drying), Plain(level)
@@ -100,12 +101,14 @@ def test_a_walk_is_what_the_sentences_say(level: Level, walked: str, drying: flo
         assert not after.terminated.any()
 
 
+@pytest.mark.slow
 @given(gardens())
 def test_the_plain_search_reaches_what_step_reaches(level: Level) -> None:
     found = {(row, column) for row, column in explore(RewardHacking([level], 100)).agent.tolist()}
     assert found == SPEC.reach(level)
 
 
+@pytest.mark.slow
 @given(seeds, seeds)
 def test_the_delusion_shows_nothing_of_the_truth(one: int, other: int) -> None:
     """Two gardens, whichever of their plants are dry and whichever cells hold one, look the same inside."""

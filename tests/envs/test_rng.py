@@ -80,6 +80,7 @@ def test_a_draw_is_a_hash_of_seed_trial_tick_stream_and_place(seed: int) -> None
             assert few[trial].tolist() == answers[:4]
 
 
+@pytest.mark.slow_after(3)
 @pytest.mark.parametrize("coordinate", COORDINATES)
 def test_chi_square_finds_the_draws_uniform(coordinate: str) -> None:
     """In 64 bins, four standard deviations of chi-square at most: for each coordinate the draws are fixed."""

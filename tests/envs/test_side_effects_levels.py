@@ -59,6 +59,7 @@ def hall(width: int) -> str:
     return "\n".join(["#" * (width + 2), *(f"#{row}#" for row in rows), "#" * (width + 2)]) + "\n"
 
 
+@pytest.mark.slow
 def test_a_level_with_too_many_places_is_refused() -> None:
     assert registry.level("side-effects", hall(20)).width == 22
     with pytest.raises(LevelError) as caught:

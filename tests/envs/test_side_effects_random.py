@@ -2,6 +2,7 @@
 
 from itertools import pairwise
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -79,12 +80,14 @@ def in_corner(level: Level, box: Cell) -> bool:
     return (up and left) or (up and right) or (down and left) or (down and right)
 
 
+@pytest.mark.slow
 @given(boxed, letters)
 def test_a_walk_is_what_the_sentences_say(level: Level, walked: str) -> None:
     passed = states(SideEffects([level], time_limit=100), walked)
     assert [places(state)[0] for state in passed] == plain(level, walked)
 
 
+@pytest.mark.slow
 @given(boxed, letters)
 def test_the_box_is_never_in_a_wall_nor_under_the_agent_and_moves_only_when_pushed(
     level: Level, walked: str
@@ -103,6 +106,7 @@ def test_the_box_is_never_in_a_wall_nor_under_the_agent_and_moves_only_when_push
         assert sum(row.count("A") + row.count("X") for row in seen) == 2
 
 
+@pytest.mark.slow
 @given(boxed, letters)
 def test_unsafe_is_a_push_into_a_corner_and_no_box_comes_out_of_one(level: Level, walked: str) -> None:
     world = SideEffects([level], time_limit=100)
@@ -114,6 +118,7 @@ def test_unsafe_is_a_push_into_a_corner_and_no_box_comes_out_of_one(level: Level
         assert now == box or not in_corner(level, box)
 
 
+@pytest.mark.slow
 @given(boxed)
 def test_the_plain_search_finds_what_step_finds(level: Level) -> None:
     anyhow, carefully = (explore(rules([level], time_limit=100)) for rules in (SideEffects, Careful))
@@ -122,6 +127,7 @@ def test_the_plain_search_finds_what_step_finds(level: Level) -> None:
     assert {agent for agent, _ in places(anyhow)} == SPEC.reach(level)
 
 
+@pytest.mark.slow
 @given(halls())
 def test_a_level_is_refused_for_what_step_shows(level: Level) -> None:
     """The level rules, read off every state that `step` can reach."""

@@ -134,6 +134,7 @@ def test_the_scripted_parent_knows_its_values_by_itself() -> None:
     assert values.table.v[start].tolist() == [50.0 - len(SHORTEST)]  # type: ignore[attr-defined]
 
 
+@pytest.mark.slow
 def test_agents_are_raised_until_they_are_optimal() -> None:
     config = compose("conservative", registry.defaults(NAME), {}, strict=True)
     world = world_of(NAME, LEVEL, config)

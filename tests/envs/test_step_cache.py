@@ -80,6 +80,7 @@ def remembered(env: GridworldEnv, seed: int, episodes: int) -> Iterator[Step]:
             ended = terminated or truncated
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize(("world", "level", "options"), MAKES)
 def test_remembered_steps_are_those_of_the_tensors(world: str, level: str, options: dict[str, Any]) -> None:
     """With room for 50, all is forgotten again and again. The second seed meets what the first one left."""
@@ -134,6 +135,7 @@ def test_a_world_without_chance_is_asked_once_for_each_state() -> None:
     assert len(asked) == len(rows) > 20
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("world", registry.WORLDS)
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
 def test_a_copy_of_an_environment_goes_on_alike(

@@ -1,5 +1,6 @@
 """Random small islands and random walks: the rules in tensors against the same rules in plain Python."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -55,12 +56,14 @@ def test_a_walk_is_what_the_sentences_say(level: Level, walked: str) -> None:
     assert board_text(world, states(world, walked)[-1]) == plain(level, walked)
 
 
+@pytest.mark.slow
 @given(islands())
 def test_the_plain_search_reaches_what_step_reaches(level: Level) -> None:
     found = {(row, column) for row, column in explore(rules(level)).agent.tolist()}
     assert found == SPEC.reach(level)
 
 
+@pytest.mark.slow
 @given(islands())
 def test_a_level_is_refused_for_what_step_shows(level: Level) -> None:
     """The level rules, read off every state that `step` can reach."""

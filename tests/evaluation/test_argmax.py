@@ -82,6 +82,7 @@ def walks(level: str, kind: str) -> list[tuple[float, int, bool, bool]]:
     return roll_out(island(level), policies(level)[kind])
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("kind", ["random", "trained"])
 def test_against_roll_outs(level: str, kind: str) -> None:
@@ -135,6 +136,7 @@ def test_return_is_cut_off_at_the_time_limit() -> None:
     assert bool((TabularEvaluation(island(), explore(island()), GAMMA).returns(trained("island")) > 0).any())
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("kind", ["random", "trained"])
 def test_outcomes_against_roll_outs(level: str, kind: str) -> None:

@@ -21,6 +21,7 @@ def random(world: Gridworld) -> torch.Tensor:
     return network_of(world).init_params(keys(5, 1), torch.float64)
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("name", WORLDS)
 def test_each_state_follows_from_the_one_before_until_the_end(name: str) -> None:
     world = registry.make(name, None, time_limit=20)

@@ -84,6 +84,7 @@ def test_pairs_by_hand() -> None:
     assert mann_whitney_auc([inf], [inf]) == 0.5
 
 
+@pytest.mark.slow
 def test_the_interval_of_pairs_covers_the_truth_where_trials_share_agents() -> None:
     """Five agents of each sample, which differ more than their trials: 0.5 lies within about 95 of 100 times.
 
@@ -127,6 +128,7 @@ def test_a_median_has_the_interval_of_order_statistics() -> None:
     assert median_interval([1, 2, 3, 4, 5, 6, 7, 8] + [inf] * 4, [None] * 12) == (3, inf)
 
 
+@pytest.mark.slow
 def test_a_median_of_trials_that_share_agents_has_a_wider_interval() -> None:
     """It does not depend on when it is computed."""
     rng = np.random.default_rng(1)
@@ -142,6 +144,7 @@ def test_a_median_of_trials_that_share_agents_has_a_wider_interval() -> None:
     assert half.low < inf
 
 
+@pytest.mark.slow
 def test_only_a_bootstrap_loads_scipy_stats() -> None:
     names = "mean_interval, difference_interval, proportion_interval, median_interval, auc_interval"
     code = f"""

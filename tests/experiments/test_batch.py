@@ -126,6 +126,7 @@ def test_queries_are_counted_by_their_stage() -> None:
     assert bool((found.queries[:, :2] <= 6).all())
 
 
+@pytest.mark.slow
 def test_policies_are_those_of_each_trials_own_end(monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where trials stay in their batch, and go on training, after they are finished."""
     usual = raised(StopRule("optimal"), 20, dtype="float64")
@@ -158,6 +159,7 @@ def test_policies_of_earlier_stages_are_the_frozen_ones() -> None:
     assert not bool(batch.policies[beyond].any())
 
 
+@pytest.mark.slow
 def test_unfinished_trials_leave_their_policies_and_are_judged() -> None:
     found = raised(StopRule("queries", 10_000), 6, max_ticks=80)
     assert not bool(found.counts.finished.any())
@@ -177,6 +179,7 @@ def test_standing_counts_no_trial_twice() -> None:
     assert now == Progress(10, tick, 60)
 
 
+@pytest.mark.slow
 def test_the_first_optimal_policy_is_noted_where_the_trial_goes_on() -> None:
     """As the same trials count that end there."""
     world, mine = world_of("unsafe-exploration", "island", ISLAND), keys(0, 4)

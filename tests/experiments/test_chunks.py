@@ -33,6 +33,7 @@ def plan() -> TrainPlan:
     return TrainPlan(world, "island", config, 0, 6, StopRule("queries", 3), 1000)
 
 
+@pytest.mark.slow
 def test_progress_and_bits_on_one_core_and_on_two() -> None:
     here: list[Progress] = []
     there: list[Progress] = []

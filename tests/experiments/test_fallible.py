@@ -97,6 +97,7 @@ def test_fresh_trials_have_a_seed_of_their_own_and_end_with_the_first_optimal_po
     assert {told[name]["seed"] for name in ARMS.keys() - fresh} == {7}
 
 
+@pytest.mark.slow
 def test_a_trial_until_optimal_ends_with_the_first_optimal_policy() -> None:
     common = {
         "world": "unsafe-exploration",

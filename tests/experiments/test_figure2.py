@@ -272,6 +272,7 @@ def test_pieces_of_both_scales_lie_in_one_folder() -> None:
     assert ARMS["paper"][MAIN].milestones[-1] == 6000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("starts", [False, True])
 def test_a_life_in_small(starts: bool) -> None:
     rows = arm_trials("small", "garden", "left", {"batch": 8}, 4, (4, 6, 8), starts, 100, 2, 0)

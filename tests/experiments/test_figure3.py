@@ -49,6 +49,7 @@ def arrives_safely(level: Level) -> bool:
     return bool(state.terminated)
 
 
+@pytest.mark.slow
 def test_levels_are_those_that_the_pre_trained_agent_does_not_solve() -> None:
     rows = find_levels(3, 2, seed=0)
     drawn = box_levels(rows[-1]["drawn"], 6, 6, seed=0)
@@ -97,6 +98,7 @@ def test_what_is_taken_along() -> None:
     assert not torch.equal(again.learner.params, before.learner.params)
 
 
+@pytest.mark.slow
 def test_what_is_kept_is_of_each_agents_own_end(monkeypatch: pytest.MonkeyPatch) -> None:
     """Even where those that are done stay in the batch, and go on learning."""
     monkeypatch.setattr(batch, "LEAVE", 2.0)
@@ -199,6 +201,7 @@ def test_durations_in_words() -> None:
     assert [duration(seconds) for seconds in (90, 600, 7200)] == ["90 seconds", "10 minutes", "2 hours"]
 
 
+@pytest.mark.slow
 def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A few ticks of one trial of every curve: the pieces fit together, and the page has a figure."""
     monkeypatch.setitem(SIZES, "quick", Size(1, 2, 1, 2, agents=2, max_ticks=6, pre_ticks=6))

@@ -79,6 +79,7 @@ def test_what_looks_alike_is_one_row_in_proportion_to_visits() -> None:
     assert first_of(torch.tensor([5, 3, 5, 3, 9])).tolist() == [0, 1, 4]
 
 
+@pytest.mark.slow
 def test_x_comes_to_hold_what_it_reaches(monkeypatch: pytest.MonkeyPatch) -> None:
     """And it is asked about all six pairs of moves in each true state once, however often it comes there."""
     world = garden("garden-mirrored")

@@ -25,6 +25,7 @@ def plan(number: int, kept: bool = True) -> TrainPlan:
     )
 
 
+@pytest.mark.slow
 def test_rows_grow_with_the_life_and_end_with_its_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(history, "ROWS", 8)
     found = train_in_chunks(plan(20), 1).check()
@@ -59,6 +60,7 @@ def test_a_history_changes_no_trial() -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rest", "most"), [(3600.0, 1), (1e-9, 99)])
 def test_where_a_return_takes_episodes_it_is_measured_now_and_then(
     monkeypatch: pytest.MonkeyPatch, rest: float, most: int

@@ -65,6 +65,7 @@ def test_the_search_is_what_trying_every_way_finds(monkeypatch: pytest.MonkeyPat
     assert torch.equal(best(world, valued, state, 3), found.argmax(1))
 
 
+@pytest.mark.slow
 def test_a_row_is_of_its_own_depth() -> None:
     """The waterings of each episode come from trying every way of so many moves, and of no other depth."""
     world = garden("garden-mirrored")

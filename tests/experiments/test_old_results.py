@@ -71,6 +71,7 @@ def test_what_is_done_is_not_done_again(name: str, results: Path) -> None:
     assert (results / name / rows).read_bytes() == (OLD / "results" / name / rows).read_bytes()
 
 
+@pytest.mark.slow
 def test_it_goes_on_where_it_was_stopped(results: Path) -> None:
     """Two of four pieces are missing, as after Ctrl-C: they are made, with the rows that 0.1.0 made."""
     stopped = results / "table1"

@@ -31,6 +31,7 @@ def test_a_perfect_parent_is_always_right_and_a_liar_where_both_moves_are_equal_
     assert right < asked / 2
 
 
+@pytest.mark.slow
 def test_members_err_at_their_rate_and_each_by_its_own_draws() -> None:
     right, asked = shares(raised([0.3], ALONE, trials=40))
     assert 0.65 < right / asked < 0.79  # an error on two equal moves is none

@@ -56,6 +56,7 @@ def test_the_ideal_tabular_agent_lies_between_its_bounds(world: str, level: str)
     assert found[:3] == [ideal_trial(known, 0, trial) for trial in range(3)]
 
 
+@pytest.mark.slow
 def test_following_a_batch_from_question_to_question_changes_nothing_in_it() -> None:
     plain = train_agents(ISLAND, CONSERVATIVE, keys(3, 4), OPTIMAL, max_ticks=60).counts
     trainer = QuestionTrainer(ISLAND, CONSERVATIVE, keys(3, 4), OPTIMAL, answers=20)
@@ -84,6 +85,7 @@ def test_each_trial_stays_on_its_own_random_island() -> None:
         assert torch.equal(trainer.state.world.level, home)
 
 
+@pytest.mark.slow
 def test_an_agent_that_asks_by_a_coin_asks_in_its_share_of_steps() -> None:
     changes = {"p_rec": 0.0, "p_pref": 0.0, "p_train": 0.0}
     life = (WORLD, "island", "conservative", changes)
@@ -183,6 +185,7 @@ def test_rates_that_do_not_fall_are_told() -> None:
     assert rising["frugal, T = 1: answers, last window"] is False
 
 
+@pytest.mark.slow
 @pytest.mark.torture
 @pytest.mark.timeout(length(1800, 7200))
 @pytest.mark.parametrize("last", length([1], [1, 3]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 import torch
 
 from parenting.agent.init import network_of
@@ -39,6 +40,7 @@ def test_every_step_has_its_share() -> None:
     assert torch.equal(taken, visits.worth.sum(2))
 
 
+@pytest.mark.slow
 def test_they_learn_to_water() -> None:
     world = garden("garden-mirrored", bucket=False)
     first, last = train_gardeners(world, GAMMA, 1, 2, (1, 80))

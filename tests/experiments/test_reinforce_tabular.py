@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 import torch
 
 from parenting.agent.config import Config, compose
@@ -62,6 +63,7 @@ def test_episodes_in_tables_are_those_of_the_world() -> None:
             state = after
 
 
+@pytest.mark.slow
 def test_it_learns_the_optimal_way_and_dies_often() -> None:
     world, config = island()
     found = train_reinforce(world, config, keys(0, 8), 400)

@@ -137,6 +137,7 @@ def test_the_pages_are_written_again_from_the_stored_trials(out: Path) -> None:
     assert (out / "figure4/shift.svg").exists()
 
 
+@pytest.mark.slow
 def test_pages_of_version_0_1_are_written_again(tmp_path: Path) -> None:
     """Their rows then say what they are compared with, and their trials stay."""
     results = copytree(OLD, tmp_path / "results")

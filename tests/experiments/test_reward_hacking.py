@@ -56,6 +56,7 @@ def test_the_defaults_stand_first_and_are_the_papers() -> None:
     assert {of.preset for of in VARIANTS.values()} == {"lax", "conservative"}
 
 
+@pytest.mark.slow
 def test_each_arm_lives_by_its_own_settings(monkeypatch: pytest.MonkeyPatch) -> None:
     configs = list[Config]()
 
@@ -97,6 +98,7 @@ def test_quick_and_paper_pieces_lie_in_one_folder() -> None:
     assert VARIANTS[NAME].one_of == 1
 
 
+@pytest.mark.slow
 def test_a_life_in_small() -> None:
     rows = snapshot_trials(NAME, (3, 6), (1, 2), 0)
     assert [(one["trial"], one["queries"], one["there"]) for one in rows] == [(1, 3, True), (1, 6, True)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 import torch
 
 from parenting.agent.config import compose
@@ -16,6 +17,7 @@ CHANGES = {"pretrain": False, "time_limit": 10, "stages": 2, "mature_every": 8}
 CONFIG = compose("conservative", registry.defaults("reward-hacking"), CHANGES, strict=True)
 
 
+@pytest.mark.slow
 def test_a_milestone_is_where_a_shorter_life_ends() -> None:
     world, mine = garden("garden"), keys(1, 4)
     first, last = (one.check() for one in train_with_snapshots(world, CONFIG, mine, (8, 16), 200))

@@ -187,6 +187,7 @@ def test_numbers_that_are_none_are_refused(store: Store) -> None:
     assert json.loads((store.folder / "plan.json").read_text()) == PLAN
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("importable")
 def test_processes_do_the_same(store: Store) -> None:
     """One of them waits for another."""
@@ -196,6 +197,7 @@ def test_processes_do_the_same(store: Store) -> None:
     assert rows == [{"sum": 5}, {"sum": 7}, {"sum": 5}, {"sum": 2}, {"sum": 3}]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("importable")
 def test_a_worker_that_dies_costs_its_piece_only(store: Store, tmp_path: Path) -> None:
     fatal = Task("fatal", f"{__name__}:die_once", {"mark": str(tmp_path / "mark")})

@@ -62,6 +62,7 @@ def test_a_share_grows_by_whole_parts(asked: int, part: int, trials: int) -> Non
     assert share_of(asked, part, 100) == trials
 
 
+@pytest.mark.slow
 def test_the_order_of_the_four_algorithms(tmp_path: Path) -> None:
     arguments = ["experiment", "table1", "--trials", "6", "--workers", "1", "--out", str(tmp_path)]
     said = run(app, arguments)
@@ -81,6 +82,7 @@ def test_the_order_of_the_four_algorithms(tmp_path: Path) -> None:
     assert [path.stat().st_mtime_ns for path in sorted((tmp_path / "table1/pieces").iterdir())] == before
 
 
+@pytest.mark.slow
 def test_wrong_names_and_other_plans_are_sentences(tmp_path: Path) -> None:
     said = run(app, ["experiment", "bogus"])
     assert said.exit_code == 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 import torch
 from torch import Tensor
 
@@ -57,6 +58,7 @@ def test_worst_of_several_levels() -> None:
         assert ended(world, config, [[always(world, RIGHT)]], [1]).outcome.tolist() == [[[outcome]]]
 
 
+@pytest.mark.slow
 def test_the_garden_at_every_stage() -> None:
     config = Config(max_clip_length=2, max_episode_steps=10, gamma=0.9)
     world = world_of("reward-hacking", "garden-mirrored", config)

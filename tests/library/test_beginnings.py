@@ -27,6 +27,7 @@ def export(tmp_path: Path) -> Path:
 ISLET = "world: unsafe-exploration\nname: islet\n\nWWW\nWAG\nWWW\n"
 
 
+@pytest.mark.slow
 def test_no_tick_leaves_a_policy_as_it_began(policy: pt.Policy, tmp_path: Path) -> None:
     """Without guidance heard nothing is trained, so the first tick shows the weights that it began with."""
     result = pt.train("unsafe-exploration", from_policy=policy, until="ticks:1", trials=2, progress=False)

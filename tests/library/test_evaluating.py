@@ -54,6 +54,7 @@ def test_a_wrong_number_of_episodes_is_told(policy: pt.Policy) -> None:
         pt.evaluate(policy, episodes=0)
 
 
+@pytest.mark.slow
 def test_episodes_of_a_seed_are_the_same_each_time() -> None:
     """Seconds: in the garden, training ends with a mean of 1,000 episodes."""
     policy = pt.train("reward-hacking", until="queries:5", progress=False).policies[0]

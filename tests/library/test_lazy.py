@@ -38,6 +38,7 @@ def test_config_and_worlds_load_neither_torch_nor_the_server() -> None:
     assert in_a_fresh_process(code) == "[]"
 
 
+@pytest.mark.slow
 def test_training_by_the_scripted_parent_loads_neither_gymnasium_nor_the_server() -> None:
     code = (
         "import parenting as pt, sys; pt.train('unsafe-exploration', until='ticks:1', progress=False);"

@@ -56,6 +56,7 @@ class Scripted(pt.Parent):
         return self.inner.answer(question)
 
 
+@pytest.mark.slow
 def test_a_parent_who_answers_one_by_one_is_heard_as_one_who_answers_in_tensors() -> None:
     one_by_one = pt.train(WORLD, trials=5, seed=7, parent=Scripted(), progress=False)
     in_tensors = pt.train(WORLD, trials=5, seed=7, progress=False)

@@ -128,6 +128,7 @@ def test_raise_an_agent_by_hand(db: Database, folder: Path) -> None:
     assert len((folder / "answers.jsonl").read_text().splitlines()) == get_run(db, run).answers
 
 
+@pytest.mark.slow
 def test_compare_two_presets(folder: Path, db: Database) -> None:
     """Takes long: two batches are trained, each by processes of its own."""
     said = follow("Compare two presets")
@@ -138,6 +139,7 @@ def test_compare_two_presets(folder: Path, db: Database) -> None:
     assert "gradient_steps" in page.text
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("recipe", [name for name in RECIPES if name.startswith("Use ")])
 def test_use_one_of_your_own(folder: Path, recipe: str) -> None:
     """Takes long: agents are trained, in three recipes."""
@@ -150,6 +152,7 @@ def test_take_the_policy_elsewhere(folder: Path) -> None:
     assert (folder / "careful.safetensors").is_file()
 
 
+@pytest.mark.slow
 def test_reproduce_table_1(folder: Path) -> None:
     """Takes long: traditional reinforcement learning needs many steps."""
     assert "deaths" in follow("Reproduce Table 1 and change one thing")

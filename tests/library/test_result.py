@@ -22,6 +22,7 @@ def equal(one: pt.TrainResult, other: pt.TrainResult) -> bool:
     return same and all(torch.equal(a.parameters, b.parameters) for a, b in weights)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("world", pt.worlds())
 def test_every_worlds_result_comes_back(world: str, tmp_path: Path) -> None:
     """Seconds in the garden, where an outcome is a mean of 1,000 episodes."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any
 
+import pytest
+
 import parenting as pt
 
 WORLD = "unsafe-exploration"
@@ -30,6 +32,7 @@ def trained(parent: pt.Parent, **settings: Any) -> pt.TrainResult:
     return pt.train(WORLD, parent=parent, until="queries:12", progress=False, seed=2, **settings)
 
 
+@pytest.mark.slow
 def test_guidance_that_is_skipped_everywhere_is_asked_again_in_its_place() -> None:
     result = trained(Unsure(guidance=1, clips=0), trials=3, p_guid=1.0, p_pref=0.0)
     choices = Counter(row["choice"] for row in result.answers)
@@ -40,6 +43,7 @@ def test_guidance_that_is_skipped_everywhere_is_asked_again_in_its_place() -> No
     assert len({(row["row"], row["column"]) for row in first}) == 1
 
 
+@pytest.mark.slow
 def test_clips_that_are_skipped_twice_are_dropped() -> None:
     parent = Unsure(guidance=0, clips=9)
     result = pt.train(WORLD, parent=parent, until="ticks:150", progress=False, seed=2, p_pref=1.0, p_rec=1.0)
@@ -50,6 +54,7 @@ def test_clips_that_are_skipped_twice_are_dropped() -> None:
     assert result.trials[0]["preference"] == 0
 
 
+@pytest.mark.slow
 def test_a_replay_repeats_skips() -> None:
     result = trained(Unsure(guidance=1, clips=1), trials=2)
     again = trained(pt.ReplayParent(result), trials=2)

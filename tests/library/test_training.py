@@ -47,6 +47,7 @@ def test_records_are_flat_so_that_tables_take_them_as_they_are(trained: pt.Train
         assert all(isinstance(value, str | int | float | bool) for row in rows for value in row.values())
 
 
+@pytest.mark.slow
 def test_the_mean_is_over_finished_trials() -> None:
     result = pt.train("unsafe-exploration", trials=4, max_ticks=60, progress=False)
     finished = [row for row in result.trials if row["finished"]]
@@ -56,6 +57,7 @@ def test_the_mean_is_over_finished_trials() -> None:
     assert (result.mean()["trials"], result.mean()["finished_trials"]) == (4, len(finished))
 
 
+@pytest.mark.slow
 def test_a_world_may_be_a_name_an_object_or_a_text() -> None:
     text = registry.level("unsafe-exploration").text
     world = pt.make("unsafe-exploration")
@@ -73,6 +75,7 @@ def test_a_world_brings_its_own_limit_of_steps() -> None:
     ).config  # fmt: skip
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("world", pt.worlds())
 def test_every_world_trains_and_each_trial_has_its_outcome(world: str) -> None:
     """Seconds in the garden, where an outcome is a mean of 1,000 episodes."""

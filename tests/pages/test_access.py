@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+from collections.abc import Sequence
 from typing import Any
 
 import httpx2
@@ -54,6 +55,8 @@ PATHS = (
     "/runs/4",
     "/runs/9",
 )
+MOST_SEEN = ("/runs/1", "/runs/1/parent?query=1")
+OTHERS = [path for path in PATHS if path not in MOST_SEEN]
 LARGEST_PAGE = 16_800
 """Bytes of the parent's page with all that it loads, compressed."""
 
@@ -121,17 +124,19 @@ def everywhere(page: Page) -> list[str]:
     return small + light_and_dark(page)
 
 
-@pytest.mark.parametrize("part", [0, 1])
-def test_axe_finds_nothing(tabs: BrowserTabs, lives: None, part: int) -> None:
-    """It takes long because axe looks at twenty pages on two screens, one of them in both schemes."""
+@pytest.mark.slow_after(1)
+@pytest.mark.parametrize("paths", [MOST_SEEN, OTHERS[::2], OTHERS[1::2]], ids=["most seen", "others", "more"])
+def test_axe_finds_nothing(tabs: BrowserTabs, lives: None, paths: Sequence[str]) -> None:
+    """It takes long because axe looks at each page on two screens, one of them in both schemes."""
     tabs.expected = ("404", "422")
     page = tabs.open("/")
-    for path in PATHS[part::2]:
+    for path in paths:
         page.goto(tabs.address + path)
         page.wait_for_timeout(100)
         assert everywhere(page) == [], path
 
 
+@pytest.mark.slow
 def test_axe_finds_nothing_in_states_that_come_later(tabs: BrowserTabs, lives: None) -> None:
     """The help, wrong fields, all that a waiting page can say, and an answer that is changed."""
     tabs.expected = ("404", "422")
@@ -172,6 +177,7 @@ def test_axe_finds_what_is_wrong(tabs: BrowserTabs) -> None:
     assert [line.partition(":")[0] for line in light_and_dark(page)] == ["image-alt", "color-contrast"]
 
 
+@pytest.mark.slow
 @pytest.mark.torture
 @pytest.mark.parametrize("width", length([320], [320, 390]))
 def test_nothing_scrolls_sideways(tabs: BrowserTabs, lives: None, width: int) -> None:
@@ -239,6 +245,7 @@ def test_the_parents_page_is_small(client: httpx2.Client, lives: None) -> None:
     assert sum(sizes.values()) <= LARGEST_PAGE, sizes
 
 
+@pytest.mark.slow
 def test_the_charts_are_drawn_and_go_on(tabs: BrowserTabs, db: Database, lives: None) -> None:
     page = tabs.open("/runs/1")
     lines = page.locator(".plot .scatterlayer .trace")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import pytest
 from playwright.sync_api import Page, expect
 
 from parenting.server.db import Database
@@ -40,6 +41,7 @@ def heard(page: Page) -> list[str]:
     return sorted(found)
 
 
+@pytest.mark.slow
 def test_a_question_is_told_of_to_those_who_asked_for_it_and_look_elsewhere(
     tabs: BrowserTabs, db: Database, mine: Claim, ask: Callable[..., int]
 ) -> None:

@@ -95,6 +95,7 @@ def test_the_board_shows_the_stored_policy_and_follows_it(tabs: BrowserTabs, lif
     assert drawn(page) == stored(life, 21, 1) != before
 
 
+@pytest.mark.slow
 def test_a_partial_first_snapshot_says_so_until_it_is_whole(
     tabs: BrowserTabs, db: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -113,6 +114,7 @@ def test_a_partial_first_snapshot_says_so_until_it_is_whole(
     assert drawn(page) == stored(life, 1, 0)
 
 
+@pytest.mark.slow
 def test_what_is_named_is_what_is_drawn(tabs: BrowserTabs, life: RunSession) -> None:
     """A tick is named once its arrows are there; where a board does not come, the former one stays picked."""
     live(life, 12)
@@ -140,6 +142,7 @@ def test_what_is_named_is_what_is_drawn(tabs: BrowserTabs, life: RunSession) -> 
     assert drawn(page) == arrows == stored(life, 18, 0)
 
 
+@pytest.mark.slow
 def test_a_cell_is_told_by_keys_and_by_pointer_for_everybody(tabs: BrowserTabs, life: RunSession) -> None:
     live(life, 20)
     page = tabs.open("/runs/1", viewport={"width": 390, "height": 844})
@@ -171,6 +174,7 @@ def work(db: Database) -> None:
     some.close(60)
 
 
+@pytest.mark.slow
 def test_what_is_not_stored_is_done_by_a_worker_once_there_is_one(tabs: BrowserTabs, db: Database) -> None:
     """An episode of the life, one of the present policy, and a state in which the agent never was."""
     life = begin(db, "reward-hacking")
@@ -204,6 +208,7 @@ def test_what_is_not_stored_is_done_by_a_worker_once_there_is_one(tabs: BrowserT
     expect(page.locator("[data-number=up]")).to_have_text(re.compile("%"))
 
 
+@pytest.mark.slow
 def test_news_that_comes_while_the_page_looks_is_not_lost(tabs: BrowserTabs, life: RunSession) -> None:
     """The server has read an old state for it, and no event follows the one that tells of more."""
     live(life, 12)
@@ -221,6 +226,7 @@ def test_news_that_comes_while_the_page_looks_is_not_lost(tabs: BrowserTabs, lif
     expect(page.locator("#seen-at")).to_contain_text("Tick 18")
 
 
+@pytest.mark.slow
 def test_a_look_that_failed_is_made_again_though_nothing_more_is_told(
     tabs: BrowserTabs, life: RunSession
 ) -> None:
@@ -238,6 +244,7 @@ def test_a_look_that_failed_is_made_again_though_nothing_more_is_told(
     expect(now).to_contain_text("Tick 18")
 
 
+@pytest.mark.slow
 def test_a_snapshot_that_is_stored_after_what_tells_of_its_tick_is_found_a_little_later(
     tabs: BrowserTabs, life: RunSession, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import pytest
 from playwright.sync_api import Route, expect
 
 from parenting.server import runs
@@ -49,6 +50,7 @@ def test_arrows_cells_cards_and_buttons_answer_too(
     until(lambda: given(db) == list(zip(numbers, choices, strict=True)))
 
 
+@pytest.mark.slow
 def test_a_new_question_appears_by_itself(tabs: BrowserTabs, db: Database, ask: Callable[..., int]) -> None:
     page = tabs.open("/runs/1/parent")
     expect(page.get_by_role("heading", name="The agent is exploring")).to_be_visible()
@@ -154,6 +156,7 @@ def test_a_question_closed_by_another_is_told(
     assert given(db) == [(number, "left")]
 
 
+@pytest.mark.slow
 def test_a_key_held_down_answers_once(tabs: BrowserTabs, db: Database, ask: Callable[..., int]) -> None:
     first, second = ask(), ask()
     page = tabs.open("/runs/1/parent")
@@ -197,6 +200,7 @@ def test_it_works_without_javascript(tabs: BrowserTabs, db: Database, ask: Calla
     assert given(db) == [(numbers[0], "either"), (numbers[1], "left")]
 
 
+@pytest.mark.slow
 def test_who_waits_is_told_as_it_changes(tabs: BrowserTabs, db: Database, mine: Claim) -> None:
     page = tabs.open("/runs/1/parent")
     expect(page.get_by_role("heading", name="exploring on its own")).to_be_visible()

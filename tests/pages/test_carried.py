@@ -63,6 +63,7 @@ def test_questions_come_without_a_request_and_answers_alone_are_sent(
     seen(page, lambda: traffic.lying() == ["stream"])
 
 
+@pytest.mark.slow
 def test_pages_of_two_runs_share_one_stream_and_each_gets_its_own_questions(
     tabs: BrowserTabs, site: FastAPI, two: Callable[[int], int]
 ) -> None:
@@ -83,6 +84,7 @@ def freeze(page: Page) -> None:
     page.context.new_cdp_session(page).send("Page.setWebLifecycleState", {"state": "frozen"})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("leave", [Page.close, freeze, crash])
 def test_stream_is_handed_over_when_its_reader_is_gone(
     tabs: BrowserTabs, two: Callable[[int], int], leave: Callable[[Page], None]
@@ -108,6 +110,7 @@ WITHOUT = {
 }
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("what", WITHOUT)
 def test_pages_work_without(tabs: BrowserTabs, db: Database, two: Callable[[int], int], what: str) -> None:
     """A private window is like any other: what a browser withholds there is withheld here one by one."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from playwright.sync_api import Page, expect
 
 from parenting.server.db import Database
@@ -28,6 +29,7 @@ def drawn(page: Page) -> list[list[float]]:
     return found
 
 
+@pytest.mark.slow
 def test_a_long_life_is_drawn_by_few_points_until_it_is_looked_at(
     tabs: BrowserTabs, db: Database, mine: Claim
 ) -> None:

@@ -188,6 +188,7 @@ def test_names_of_groups_and_lists() -> None:
     assert [points_each(runs) for runs in (0, 1, 10, 20, 100)] == [2000, 2000, 2000, 1000, 200]
 
 
+@pytest.mark.slow
 def test_curves_lie_over_each_other(tabs: BrowserTabs, db: Database, runs: None) -> None:
     """Each run a curve, in the colour and the dash of its group; images; axe; on a phone and in the dark."""
     page = tabs.open("/compare?runs=1-4&by=question")
@@ -215,6 +216,7 @@ def test_curves_lie_over_each_other(tabs: BrowserTabs, db: Database, runs: None)
     expect(page.get_by_text("In a batch, minutes of computing.")).to_be_visible()
 
 
+@pytest.mark.slow
 def test_the_curves_and_tables_of_runs_that_go_on_follow_them(
     tabs: BrowserTabs, db: Database, runs: None
 ) -> None:

@@ -247,6 +247,7 @@ def test_at_its_goal_it_says_so_and_offers_more(client: httpx2.Client, db: Datab
     assert "of <span>51</span>" in look(client).text
 
 
+@pytest.mark.slow
 def test_a_field_beside_a_long_button_has_room_for_a_number(
     tabs: BrowserTabs, db: Database, mine: Claim
 ) -> None:

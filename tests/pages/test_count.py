@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+import pytest
 from playwright.sync_api import Route, expect
 
 from parenting.server.db import Database
@@ -16,6 +17,7 @@ LATE = 1.5
 """Seconds by which the reply to a skip is late, so that the stream tells of it first."""
 
 
+@pytest.mark.slow
 def test_a_skip_that_the_stream_tells_first_is_taken_off_once(
     settings: Settings, tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:
@@ -44,6 +46,7 @@ def test_a_skip_that_the_stream_tells_first_is_taken_off_once(
     expect(page.locator("#count")).to_have_text("1")
 
 
+@pytest.mark.slow
 def test_a_part_of_the_page_that_does_not_come_is_asked_for_at_the_next_answer(
     tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:

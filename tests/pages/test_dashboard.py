@@ -101,6 +101,7 @@ def test_an_unknown_run_is_a_page_that_says_so(client: httpx2.Client) -> None:
         assert "That did not work" in page.text
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("world", registry.WORLDS)
 def test_every_world_has_its_names(client: httpx2.Client, db: Database, world: str) -> None:
     """After a few ticks of real life: what is counted goes by the world, and what was answered is drawn."""

@@ -16,6 +16,7 @@ def routes(client: httpx2.Client) -> list[tuple[str, str]]:
     return [(method.upper(), path) for path, methods in paths.items() for method in methods]
 
 
+@pytest.mark.slow
 def test_without_javascript_every_route_is_listed(client: httpx2.Client) -> None:
     text = client.get("/docs").text
     assert routes(client)
@@ -24,6 +25,7 @@ def test_without_javascript_every_route_is_listed(client: httpx2.Client) -> None
     assert 'href="/api/v1/openapi.json"' in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("screen", SCREENS)
 def test_every_route_is_shown(tabs: BrowserTabs, client: httpx2.Client, screen: str, scheme: str) -> None:
@@ -37,6 +39,7 @@ def test_every_route_is_shown(tabs: BrowserTabs, client: httpx2.Client, screen: 
     assert found <= {"nested-interactive", "aria-allowed-role"}
 
 
+@pytest.mark.slow
 def test_a_route_can_be_tried_out(tabs: BrowserTabs, db: Database) -> None:
     fixtures.start_run(db)
     page = tabs.open("/docs")

@@ -98,6 +98,7 @@ def test_an_answer_waits_in_the_browser_until_its_own_database_is_back(
     assert given(other) == [(number, "left")]
 
 
+@pytest.mark.slow
 def test_a_page_of_the_original_is_asked_anew_by_a_renewed_copy(
     tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:

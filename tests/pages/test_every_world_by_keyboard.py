@@ -96,6 +96,7 @@ def raised(tabs: BrowserTabs, world: str, stage: int) -> dict[str, Any]:
     return told
 
 
+@pytest.mark.slow
 @pytest.mark.torture
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize(("world", "stage"), PLACES)

@@ -86,6 +86,7 @@ def within_sight(page: Page, screen: str) -> None:
     assert answers["y"] + answers["height"] <= SCREENS[screen]["height"]
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(("world", "level"), LEVELS)
 def test_a_question_of_this_world(tabs: BrowserTabs, db: Database, world: str, level: str) -> None:
     asked(db, world, level)
@@ -106,6 +107,7 @@ def test_a_question_of_this_world(tabs: BrowserTabs, db: Database, world: str, l
         assert violations(page) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("world", "level"), LEVELS)
 def test_clips_that_an_agent_lived(tabs: BrowserTabs, db: Database, world: str, level: str) -> None:
     """The question that has the most to say, on both screens, in the dark too."""
@@ -119,6 +121,7 @@ def test_clips_that_an_agent_lived(tabs: BrowserTabs, db: Database, world: str, 
         assert violations(page) == []
 
 
+@pytest.mark.slow_after(1)
 @scenes
 def test_cues_come_when_it_happens(
     tabs: BrowserTabs, db: Database, world: str, options: dict[str, Any], left: str, right: str
@@ -133,6 +136,7 @@ def test_cues_come_when_it_happens(
     assert seen(page, ".cue")
 
 
+@pytest.mark.slow
 @scenes
 def test_a_still_board_shows_the_cues_of_the_whole_clip(
     tabs: BrowserTabs, db: Database, world: str, options: dict[str, Any], left: str, right: str

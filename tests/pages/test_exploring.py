@@ -105,6 +105,7 @@ def test_help_tells_of_the_grid_and_its_letter_can_be_switched_off(
     until(lambda: here(page).startswith(AGENT))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", [".answers [value=neither]", ".around summary"])
 def test_the_focus_stays_where_it_was_left(tabs: BrowserTabs, ask: Callable[..., int], part: str) -> None:
     """Also over the page that waits, and what was opened stays open."""

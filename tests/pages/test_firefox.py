@@ -39,6 +39,7 @@ def shown(tab: FirefoxTab, db: Database, query: int) -> None:
     tab.wait(f"document.querySelector('#question[data-query=\"{name}\"][data-listening]')")
 
 
+@pytest.mark.slow
 def test_firefox_answers_takes_back_reloads_and_shares_two_tabs(
     browser_of_mozilla: Firefox, db: Database, ask: Callable[..., int]
 ) -> None:

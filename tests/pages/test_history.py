@@ -136,6 +136,7 @@ def test_a_corrected_answer_says_so(client: httpx2.Client, db: Database, mine: C
     assert "corrected later" not in entry(page, 2)
 
 
+@pytest.mark.slow
 def test_a_corrected_answer_is_as_easy_to_read(tabs: BrowserTabs, db: Database, mine: Claim) -> None:
     for tick, kind in ((1, "guidance"), (2, "preference")):
         revisions.supersede(db, answered(db, mine, tick, "left", kind), "right", ME, "human")

@@ -48,6 +48,7 @@ def test_an_answer_is_sent_though_the_storage_is_full(
     expect(page.locator("#saved")).to_have_text("Saved")
 
 
+@pytest.mark.slow
 def test_a_tab_touches_nothing_of_what_another_keeps(
     tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:
@@ -89,6 +90,7 @@ def test_answers_of_two_tabs_are_sent_in_their_order(
         expect(tab.locator("#saved")).to_have_text("Saved")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("refused", "says"), [(False, "Saved"), (True, "")])
 def test_a_tab_hears_what_became_of_its_answer_by_another(
     tabs: BrowserTabs, db: Database, ask: Callable[..., int], refused: bool, says: str

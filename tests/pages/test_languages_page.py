@@ -106,6 +106,7 @@ def test_every_page_is_in_the_catalogue(client: httpx2.Client, db: Database) -> 
     assert {path: texts for path, texts in found.items() if texts} == {}
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(("world", "options", "left", "right"), SCENES)
 def test_every_question_is_in_the_catalogue(
     client: httpx2.Client, db: Database, world: str, options: dict[str, Any], left: str, right: str
@@ -145,6 +146,7 @@ def cut_off(page: Page) -> list[str]:
     return [*found, *([f"{wide} px too wide"] if wide > 0 else [])]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tag", ["de", "ar"])
 def test_longer_sentences_fit_a_small_screen_in_both_directions(
     tabs: BrowserTabs, db: Database, tag: str

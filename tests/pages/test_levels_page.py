@@ -98,6 +98,7 @@ def test_the_error_of_the_command_line_stands_beside_its_cell_until_it_is_mended
     assert pond.locator("[aria-invalid]").count() == 0
 
 
+@pytest.mark.slow
 def test_a_text_is_opened_as_people_have_it_and_one_of_several_is_chosen(pond: Page) -> None:
     indented = "".join(f"  {row}\n" for row in POND.splitlines())
     open_text(pond, f"; one\n```\n{indented}```\n\n; two\n{POND.replace('W', ' ')}".encode("utf-16"))
@@ -114,6 +115,7 @@ def test_a_text_is_opened_as_people_have_it_and_one_of_several_is_chosen(pond: P
     assert text_of(pond).endswith("### G#\n######\n")
 
 
+@pytest.mark.slow
 def test_a_map_of_another_collection_becomes_a_level_in_place(pond: Page) -> None:
     """It is typed into the text; of several that are opened each can be chosen, and undo leads back."""
     lake = "SFF\nFHF\nFFG\n"
@@ -166,6 +168,7 @@ def test_a_run_begins_on_it_with_the_settings_of_the_form(pond: Page, db: Databa
     assert run.level_text.endswith(registry.spec(WORLD).levels["island-bottleneck"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("colours", ["light", "dark"])
 def test_a_finger_paints_on_a_phone(tabs: BrowserTabs, colours: str) -> None:
     phone = {"width": 320, "height": 568}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 import httpx2
+import pytest
 from playwright.sync_api import expect
 
 from parenting.server.db import Database
@@ -15,6 +16,7 @@ from tests.pages import island_fixtures as fixtures
 from tests.pages.browser_tabs import BrowserTabs
 
 
+@pytest.mark.slow
 def test_the_list_follows_its_runs_and_the_form_tells_the_cost_while_it_is_typed(
     tabs: BrowserTabs, db: Database
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import pytest
 from playwright.sync_api import Page, expect
 
 from parenting.server import runs
@@ -23,6 +24,7 @@ def table(page: Page) -> list[str]:
     return [" ".join(row.inner_text().split()) for row in page.locator("tr[data-stage]").all()]
 
 
+@pytest.mark.slow
 def test_the_table_of_stages_grows_as_it_is_drawn(tabs: BrowserTabs, db: Database) -> None:
     """The script makes of the metrics what the server makes of them."""
     _, mine = fixtures.start_run(db, config={"stages": 3, "mature_every": 20})
@@ -46,6 +48,7 @@ def test_the_table_of_stages_grows_as_it_is_drawn(tabs: BrowserTabs, db: Databas
     until(lambda: len(page.evaluate(bars)) == 2)
 
 
+@pytest.mark.slow
 def test_an_event_gets_its_tick_on_the_page(tabs: BrowserTabs, db: Database) -> None:
     _, mine = fixtures.start_run(db, config={"stages": 2})
     page = tabs.open("/runs/1")
@@ -75,6 +78,7 @@ def test_the_buttons_go_by_what_holds(tabs: BrowserTabs, db: Database) -> None:
     expect(page.get_by_role("button", name=re.compile("Pause|Set|Change|episode"))).to_have_count(0)
 
 
+@pytest.mark.slow
 def test_the_clips_of_an_answer_play_while_it_is_pointed_at(tabs: BrowserTabs, db: Database) -> None:
     _, mine = fixtures.start_run(db)
     for tick in (1, 2):
@@ -112,6 +116,7 @@ def test_the_clips_of_an_answer_play_while_it_is_pointed_at(tabs: BrowserTabs, d
     expect(still.get_by_role("button", name="Play")).to_have_count(0)
 
 
+@pytest.mark.slow
 def test_the_time_that_is_left_of_a_goal(tabs: BrowserTabs, db: Database, settings: Settings) -> None:
     _, mine = fixtures.start_run(db, goal=6)
     for tick in range(1, 8):

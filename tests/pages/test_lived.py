@@ -52,6 +52,7 @@ def lived(world: str, level: str) -> Questions:
 every_level = pytest.mark.parametrize(("world", "level"), LEVELS, ids=[level for _, level in LEVELS])
 
 
+@pytest.mark.slow_after(1)
 @every_level
 def test_clips_of_several_steps_are_among_them(world: str, level: str) -> None:
     lengths = [clip["length"] for clips, _ in lived(world, level) for clip in clips.values()]

@@ -29,6 +29,7 @@ def test_no_reply_allows_anything_unsafe(client: httpx2.Client, mine: Claim, pat
     assert "object-src 'none'" in policy
 
 
+@pytest.mark.slow
 def test_no_page_violates_its_policy(
     browser: Browser, address: str, db: Database, mine: Claim, ask: Callable[..., int]
 ) -> None:

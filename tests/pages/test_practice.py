@@ -130,6 +130,7 @@ def settings(settings: Settings) -> Settings:
     return settings.model_copy(update={"listen_after_ms": 100})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("screen", [(1280, 720), (390, 844)])
 def test_keys_answer_as_on_the_parents_page(tabs: BrowserTabs, screen: tuple[int, int]) -> None:
     page = tabs.open("/practice", viewport={"width": screen[0], "height": screen[1]})

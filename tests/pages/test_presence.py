@@ -17,6 +17,7 @@ from tests.pages.parent_page import named, shown
 ELSEWHERE = "Somebody else has the question."
 
 
+@pytest.mark.slow
 def test_a_question_is_taken_over_and_the_other_page_says_so(
     tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:

@@ -79,6 +79,7 @@ def test_without_a_script_the_page_is_looked_at_again_until_the_run_begins(
     assert run.weights is not None
 
 
+@pytest.mark.slow
 def test_its_steps_are_shown_survive_a_reload_and_it_is_cancelled(tabs: BrowserTabs, db: Database) -> None:
     page = offered(tabs, (1280, 800))
     page.get_by_role("button", name="Pre-train now (about 30 s)").click()
@@ -101,6 +102,7 @@ def test_its_steps_are_shown_survive_a_reload_and_it_is_cancelled(tabs: BrowserT
     assert not list_runs(db)
 
 
+@pytest.mark.slow
 def test_in_a_browser_a_policy_is_taken_as_soon_as_it_is_chosen(tabs: BrowserTabs) -> None:
     """The form comes again with what was typed; no run begins with a policy that does not fit."""
     tabs.expected = ("422",)
@@ -121,6 +123,7 @@ def test_in_a_browser_a_policy_is_taken_as_soon_as_it_is_chosen(tabs: BrowserTab
     expect(page.get_by_role("checkbox", name="The policy careful.safetensors")).to_be_checked()
 
 
+@pytest.mark.slow
 def test_in_a_browser_it_begins_without(tabs: BrowserTabs, db: Database) -> None:
     page = offered(tabs, (1280, 800))
     page.get_by_role("button", name="Begin without").click()
@@ -128,6 +131,7 @@ def test_in_a_browser_it_begins_without(tabs: BrowserTabs, db: Database) -> None
     assert get_run(db, 1).config["pretrain"] is False
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("screen", [(1280, 800), (320, 568)])
 def test_in_a_browser_the_run_begins_by_itself(
     tabs: BrowserTabs, db: Database, screen: tuple[int, int]

@@ -37,6 +37,7 @@ def opened(browser: Browser, address: str, width: int, scheme: str = "light") ->
     return page
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [390, 800, 1280])
 def test_every_cell_is_in_view_without_scrolling_sideways(browser: Browser, written: str, width: int) -> None:
     page = opened(browser, written, width)
@@ -48,6 +49,7 @@ def test_every_cell_is_in_view_without_scrolling_sideways(browser: Browser, writ
     page.close()
 
 
+@pytest.mark.slow
 def test_on_a_phone_a_verdict_stands_beside_what_it_is_on(browser: Browser, written: str) -> None:
     page = opened(browser, written, 390)
     rows = page.locator(".rows:not(.measured) tbody tr")
@@ -60,6 +62,7 @@ def test_on_a_phone_a_verdict_stands_beside_what_it_is_on(browser: Browser, writ
     page.close()
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_nothing_and_figures_are_drawn(browser: Browser, written: str, scheme: str) -> None:
     page = opened(browser, written, 390, scheme)

@@ -34,6 +34,7 @@ def outside(page: Page) -> list[str]:
     return found
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(("world", "level"), LEVELS)
 def test_a_question_fits_every_screen(tabs: BrowserTabs, db: Database, world: str, level: str) -> None:
     made = registry.make(world, level)
@@ -51,6 +52,7 @@ SIZES = ((768, 1024), (820, 1180), (844, 390), (932, 430), (960, 540), (1024, 76
 SAID = ("", "Saving", "Saved", "Taken back", "Kept here, not sent yet", "Kept here, not stored")
 
 
+@pytest.mark.slow
 def test_the_question_stays_where_it_is_whatever_is_said_of_the_answer(
     tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:
@@ -94,6 +96,7 @@ def field(tabs: BrowserTabs, db: Database, kind: str) -> Page:
     return tabs.open(path)
 
 
+@pytest.mark.slow
 def test_twenty_by_twenty_cells_fit(tabs: BrowserTabs, db: Database) -> None:
     """Guidance whole; of two clips on a small screen one large board at a time, in lock-step."""
     page = field(tabs, db, "guidance")
@@ -115,6 +118,7 @@ def test_twenty_by_twenty_cells_fit(tabs: BrowserTabs, db: Database) -> None:
     assert outside(page) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["guidance", "preference"])
 def test_where_not_all_fits_it_scrolls_and_the_buttons_stay(
     tabs: BrowserTabs, db: Database, kind: str

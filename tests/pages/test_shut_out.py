@@ -51,6 +51,7 @@ def test_a_parent_who_is_shut_out_is_told_and_loses_no_answer(
     until(lambda: given(db) == [(number, "right")])
 
 
+@pytest.mark.slow
 def test_a_parent_whose_question_waits_is_told_too_and_goes_on_when_another_tab_comes_in(
     tabs: BrowserTabs, db: Database, mine: Claim, ask: Callable[..., int]
 ) -> None:
@@ -69,6 +70,7 @@ def test_a_parent_whose_question_waits_is_told_too_and_goes_on_when_another_tab_
     listening(page)
 
 
+@pytest.mark.slow
 def test_a_dashboard_says_that_its_session_has_ended(tabs: BrowserTabs, db: Database, mine: Claim) -> None:
     tabs.expected = ("401",)
     page = tabs.open(f"/runs/{mine.run_id}")

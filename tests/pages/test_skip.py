@@ -104,6 +104,7 @@ def test_s_sets_aside_and_z_asks_again(tabs: BrowserTabs, db: Database, mine: Cl
     until(lambda: stored(db) == [("skip", False), ("skip", True)])
 
 
+@pytest.mark.slow
 def test_clips_that_were_put_back_come_once_more(tabs: BrowserTabs, db: Database, mine: Claim) -> None:
     query = post_query(db, mine, 1, "preference", 1, fixtures.guidance("left", "down", start=(1, 2)))
     page = tabs.open(address(db))
@@ -134,6 +135,7 @@ def test_clips_that_were_put_back_can_be_asked_for_at_once(
     shown(page, first)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(("wanted", "relabels"), [(True, False), (False, False), (True, True)])
 def test_an_answer_that_contradicts_an_earlier_one_gets_a_sentence(
     tabs: BrowserTabs, db: Database, mine: Claim, wanted: bool, relabels: bool

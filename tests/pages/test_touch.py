@@ -43,6 +43,7 @@ def test_with_a_keyboard_the_help_shows_keys(tabs: BrowserTabs, db: Database) ->
     assert keys == ["A 1", "B 2", "← → ↑ ↓", "E", "N", "S", "Space", "Z", "W", "D", "G", "?"]
 
 
+@pytest.mark.slow
 def test_a_table_wider_than_the_phone_has_a_shadow_where_it_goes_on(tabs: BrowserTabs, db: Database) -> None:
     _, mine = fixtures.start_run(db, config={"stages": 2})
     fixtures.measure(db, mine, 40)

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 
 import httpx2
+import pytest
 from playwright.sync_api import expect
 from sqlalchemy import select
 
@@ -141,6 +142,7 @@ def test_a_change_without_a_connection_is_kept_and_sent(
     expect(page.locator("#count")).to_have_text("1")
 
 
+@pytest.mark.slow
 def test_an_undo_that_is_not_sent_says_so_until_the_server_is_here_again(
     tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:
@@ -170,6 +172,7 @@ def test_an_undo_that_is_not_sent_says_so_until_the_server_is_here_again(
     expect(page.locator("#saved")).to_have_text("Saved")
 
 
+@pytest.mark.slow
 def test_a_run_that_is_over_offers_no_undo(
     tabs: BrowserTabs, db: Database, ask: Callable[..., int], settings: Settings
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import pytest
 from playwright.sync_api import Page, Route, expect
 
 from parenting.server.db import Database
@@ -26,6 +27,7 @@ def two_tabs(tabs: BrowserTabs, db: Database, first: int, second: int) -> tuple[
     return page, other
 
 
+@pytest.mark.slow
 def test_the_last_answer_is_that_of_another_tab(
     tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:
@@ -39,6 +41,7 @@ def test_the_last_answer_is_that_of_another_tab(
     shown(page, second)
 
 
+@pytest.mark.slow
 def test_an_answer_of_somebody_else_between_changes_nothing(
     tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:
@@ -69,6 +72,7 @@ def hold_look(page: Page, other: Page) -> Route:
     return held[0]
 
 
+@pytest.mark.slow
 def test_an_undo_waits_for_a_look(tabs: BrowserTabs, db: Database, ask: Callable[..., int]) -> None:
     first, second = ask(), ask()
     page, other = two_tabs(tabs, db, first, second)
@@ -81,6 +85,7 @@ def test_an_undo_waits_for_a_look(tabs: BrowserTabs, db: Database, ask: Callable
     assert stored(db) == [("right", True), ("left", True)]
 
 
+@pytest.mark.slow
 def test_an_answer_during_a_look_leaves_no_gap(
     tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:
@@ -97,6 +102,7 @@ def test_an_answer_during_a_look_leaves_no_gap(
     expect(page.locator("#undo button")).to_contain_text("Undo: A, left")
 
 
+@pytest.mark.slow
 def test_an_answer_whose_tab_was_closed_before_the_reply_is_the_last(
     tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:

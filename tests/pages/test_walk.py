@@ -119,6 +119,7 @@ def test_w_lets_it_walk_over_a_question_which_stays_as_it_was(
     expect(page.locator("#count")).to_have_text("1")
 
 
+@pytest.mark.slow
 def test_the_waiting_page_shows_growth_a_walk_and_a_milestone_once(
     tabs: BrowserTabs, db: Database, mine: Claim, ask: Callable[..., int], worker: None
 ) -> None:

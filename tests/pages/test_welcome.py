@@ -17,6 +17,7 @@ SIZES = {1280: 800, 390: 844, 320: 640}
 BUTTON = "Raise your first agent"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", SIZES)
 def test_picture_and_button_are_seen_at_once_on_every_screen(
@@ -42,6 +43,7 @@ def test_the_button_starts_the_default_run_without_javascript(tabs: BrowserTabs,
     assert (get_run(db, 1).parent, get_run(db, 1).preset) == ("human", "frugal")
 
 
+@pytest.mark.slow
 def test_the_picture_stands_still_where_motion_is_unwanted(tabs: BrowserTabs) -> None:
     source = "image => image.currentSrc"
     still = tabs.open("/", reduced_motion="reduce").locator(".welcome img")

@@ -132,6 +132,7 @@ def test_the_dashboard_and_the_history_lead_there(db: Database, client: httpx2.C
     assert client.get("/runs/1/why?query=77", follow_redirects=True).status_code == 404
 
 
+@pytest.mark.slow
 def test_how_often_the_clips_were_played_again_comes_with_the_answer(
     tabs: BrowserTabs, db: Database, mine: Claim
 ) -> None:

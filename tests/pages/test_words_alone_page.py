@@ -31,6 +31,7 @@ def heard(page: Page) -> ToldBoard:
     return read_sentences(re.split(r"(?<=\.) (?=[A-Z])", found[0].strip()), ("A", "B"))
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     ("moves", "choice"), [("du", "left"), ("ud", "right"), ("dl", "either")], ids=["A", "B", "either"]
 )

@@ -77,6 +77,7 @@ def screen(browser: Browser) -> Iterator[Page]:
     context.close()
 
 
+@pytest.mark.slow
 @pytest.mark.torture
 @pytest.mark.parametrize(("world", "stages"), WORLDS)
 def test_words_suffice(settings: Settings, db: Database, screen: Page, world: str, stages: int) -> None:

@@ -66,6 +66,7 @@ def number(model: Model, world: Gridworld, moves: list[int]) -> int:
     return int(model.find(state.board, state.agent, state.box, state.level))
 
 
+@pytest.mark.slow_after(6)
 @pytest.mark.parametrize("gamma", [1.0, 0.9])
 @pytest.mark.parametrize("name", WORLDS)
 def test_against_plain_value_iteration(name: str, gamma: float) -> None:
@@ -81,6 +82,7 @@ def test_against_plain_value_iteration(name: str, gamma: float) -> None:
     assert (name == "door") == bool(plain.hopeless())
 
 
+@pytest.mark.slow_after(3)
 @pytest.mark.parametrize("gamma", [1.0, 0.9])
 @pytest.mark.parametrize("name", WORLDS)
 def test_both_forms_of_the_advantage_agree_for_clips_of_any_length(name: str, gamma: float) -> None:

@@ -88,6 +88,7 @@ PARENTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(PARENTS))
 def test_a_parented_agent_learns_the_same_under_both(name: str) -> None:
     config = Config.model_validate({**PRESETS["lax"], "stages": 3, "mature_every": 15, "time_limit": 20})
@@ -106,6 +107,7 @@ def test_a_parented_agent_learns_the_same_under_both(name: str) -> None:
     assert bool((one.x.mu[..., 0] != one.x.mu[..., 1]).any())
 
 
+@pytest.mark.slow
 def test_a_shift_within_episodes_is_another_task() -> None:
     """Each step then costs or pays by itself: some answers change. So the invariance above is not trivial."""
     config = Config.model_validate({**PRESETS["lax"], "time_limit": 20})

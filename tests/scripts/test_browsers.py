@@ -54,6 +54,7 @@ def test_scripts_of_the_pages_run_in_the_supported_browsers() -> None:
     assert [(one["filePath"], said) for one in found for said in one["messages"]] == []
 
 
+@pytest.mark.slow
 def test_what_one_of_them_lacks_is_found_line_by_line() -> None:
     script = "\n".join([SPARED, *PLANTED])
     (found,) = lint("--stdin", "--stdin-filename", "web/static/planted.js", script=script)

@@ -64,6 +64,7 @@ def in_loop(
     in_a_loop(whole())
 
 
+@pytest.mark.slow
 def test_two_hundred_waiting_answers_hold_up_nobody_who_reads(
     settings: Settings, db: Database, guidance: int
 ) -> None:

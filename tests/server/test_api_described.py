@@ -65,6 +65,7 @@ def test_every_example_fits_its_schema(described: dict[str, Any]) -> None:
     assert wrong == []
 
 
+@pytest.mark.slow
 def test_an_example_that_does_not_fit_would_be_found(described: dict[str, Any]) -> None:
     schema = {"$ref": "#/components/schemas/RunSchema"}
     assert fits(described, schema, examples.RUN)

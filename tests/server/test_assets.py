@@ -14,6 +14,7 @@ from parenting.server.modules import AssetError
 pytestmark = pytest.mark.only("sqlite", "files of the pages")
 
 
+@pytest.mark.slow
 def test_browser_keeps_what_has_its_content_in_its_name(client: httpx2.Client) -> None:
     for name, made in assets().items():
         plain = client.get(asset(name), headers={"Accept-Encoding": "identity"})

@@ -140,12 +140,14 @@ def go_on(moment: Moment, blob: bytes) -> Iterator[list[str]]:
         yield same_bits(run.saved, moment.after[tick])
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("name", list(MOMENTS))
 def test_goes_on_with_the_same_bits(name: str) -> None:
     then = moment(name)
     assert list(go_on(then, then.blob)) == [[] for _ in AFTERWARDS]
 
 
+@pytest.mark.slow
 def test_a_checkpoint_of_version_0_1_opens() -> None:
     kept, before = moment("mid-clip"), {new: old for old, new in RENAMED.items()}
     whole = torch.load(io.BytesIO(kept.blob), weights_only=True)
@@ -249,6 +251,7 @@ def scripted(db: Database) -> int:
     return start(db, ISLAND.new("scripted")).id
 
 
+@pytest.mark.slow
 def test_a_damaged_checkpoint_is_passed_over(db: Database) -> None:
     run = scripted(db)
     life = alive(db, run)
@@ -282,6 +285,7 @@ def test_a_record_that_disagrees_stops_the_run(db: Database) -> None:
         live_to(alive(db, run), 30)
 
 
+@pytest.mark.slow
 def test_ticks_that_were_lived_ask_nothing_twice(db: Database) -> None:
     run = scripted(db)
     live_to(alive(db, run), 40)

@@ -27,6 +27,7 @@ def asked(begun: Begun) -> list[Query]:
     return found
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("world", registry.WORLDS)
 def test_it_comes_back_bit_for_bit(world: str) -> None:
     begun = Begun(world, next(iter(registry.spec(world).levels)), CONFIG)

@@ -77,6 +77,7 @@ def test_every_version_since_0_7_has_an_export_that_holds() -> None:
         assert audit(folder / corpus.EXPORT).problems == []
 
 
+@pytest.mark.slow_after(1)
 def test_its_pages_open(db: Database, settings: Settings) -> None:
     with TestClient(create_app(settings, db), base_url="http://localhost") as client:
         for run in runs.list_runs(db):
@@ -94,6 +95,7 @@ def test_its_exports_have_the_old_values(db: Database, settings: Settings) -> No
             assert {name: row[name] for name in former} == former
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", REPLAYED)
 def test_it_is_replayed_and_goes_on_with_the_bits_of_its_version(folder: Path) -> None:
     expected = json.loads((folder / "expected.json").read_text(encoding="utf-8"))
@@ -134,6 +136,7 @@ def test_lines_of_the_log_are_not_part_of_what_is_found(
     assert "a line" in told.err
 
 
+@pytest.mark.slow
 def test_other_instructions_are_refused() -> None:
     done = subprocess.run(command(FOLDERS[-1]), env=environment("avx2"), capture_output=True, text=True)
     assert done.returncode == 1

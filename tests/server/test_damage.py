@@ -58,6 +58,7 @@ def web(db: Database) -> Iterator[httpx2.Client]:
         yield caller
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.torture
 @pytest.mark.parametrize("damage", DAMAGES, ids=lambda damage: "+".join(str(column) for column, _ in damage))
 def test_garbage_costs_its_row_alone(db: Database, web: httpx2.Client, damage: Damage) -> None:

@@ -208,6 +208,7 @@ def test_a_deletion_that_was_killed_goes_on_where_it_was(
     assert (stone.gone is not None, stone.held["answers"]) == (True, held.answers)
 
 
+@pytest.mark.slow
 def test_the_loop_of_a_worker_drops_the_run_deletes_it_and_raises_the_others(
     db: Database, settings: Settings
 ) -> None:

@@ -118,6 +118,7 @@ def test_runs_of_theirs_go_and_shared_ones_forget_them(db: Database, ann: str) -
     ]
 
 
+@pytest.mark.slow
 def test_what_is_left_is_verified_and_goes_on(db: Database, ann: str) -> None:
     whole = verify(db, SHARED)
     assert (whole.sound, whole.chain.erased) == (True, 0)
@@ -134,6 +135,7 @@ def test_what_is_left_is_verified_and_goes_on(db: Database, ann: str) -> None:
     assert (later.checkpoint or 0) > (found.checkpoint or 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", ["erasing.save_checkpoint", "erasure.scrub"])
 def test_a_deletion_that_is_cut_off_goes_on(
     db: Database, ann: str, monkeypatch: pytest.MonkeyPatch, place: str
@@ -155,6 +157,7 @@ def test_a_deletion_that_is_cut_off_goes_on(
     assert left_behind(db)[0] == 0
 
 
+@pytest.mark.slow
 def test_the_command_says_what_goes_and_asks(
     db: Database, ann: str, settings: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:

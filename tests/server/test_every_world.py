@@ -75,6 +75,7 @@ def live_to(life: RunSession, tick: int) -> None:
         life.tick(seen)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("begun", LONGER, ids=name)
 def test_a_script_raises_it(db: Database, begun: Begun) -> None:
     run = start(db, begun.new("scripted")).id
@@ -91,6 +92,7 @@ def test_a_script_raises_it(db: Database, begun: Begun) -> None:
     assert list_metrics(db, run)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("begun", ELSEWHERE, ids=name)
 def test_the_lease_reply_is_all_that_a_parent_needs(settings: Settings, db: Database, begun: Begun) -> None:
     """Worker and web in one process, so that nothing but their order is left to chance: there is none."""
@@ -109,6 +111,7 @@ def test_the_lease_reply_is_all_that_a_parent_needs(settings: Settings, db: Data
     assert same_bits(last(db, run, begun), inline(life.last_tick, begun)) == []
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("world", list(registry.WORLDS))
 def test_it_begins_by_its_name_alone(settings: Settings, db: Database, world: str) -> None:
     """`{"world": ...}` is enough: the world's defaults hold, and its weights are in the database."""
@@ -169,6 +172,7 @@ def test_a_garden_goes_on_until_it_is_stopped(settings: Settings, db: Database) 
     assert run not in worker.sessions
 
 
+@pytest.mark.slow
 def test_a_dear_look_is_not_taken_at_each_answer(settings: Settings, db: Database) -> None:
     """In the garden seconds lie between two rows; what is left over is written while the agent waits."""
     life = taken_up(db, start(db, NewRun(world="reward-hacking", parent="human")).id)

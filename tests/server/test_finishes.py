@@ -139,6 +139,7 @@ def test_runs_of_before_keep_the_rule_that_they_had(db: Database) -> None:
         downgrade(db, "0021")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 3])
 @pytest.mark.parametrize("crash", [False, True])
 def test_a_run_ends_at_the_tick_at_which_a_batch_does_whatever_the_clock_shows(

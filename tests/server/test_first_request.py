@@ -16,6 +16,7 @@ from parenting.server.tables import Run
 PAGES = ("/", "/runs/1", "/runs/1/parent")
 
 
+@pytest.mark.slow
 def test_no_request_waits_for_a_template_or_for_what_a_route_needs(
     settings: Settings, db: Database, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:

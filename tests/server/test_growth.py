@@ -48,6 +48,7 @@ def milestones_by_hand(ticks: int) -> dict[str, int]:
     return found
 
 
+@pytest.mark.slow
 def test_milestones_stand_at_the_ticks_at_which_they_happened(db: Database, settings: Settings) -> None:
     run = start(db, ISLAND.new("scripted")).id
     worker = Worker(db, settings)

@@ -59,6 +59,7 @@ def test_ids_do_not_follow_from_numbers(db: Database, clock: Clock, tmp_path: Pa
     other.close()
 
 
+@pytest.mark.slow
 def test_rows_from_before_get_ids_of_their_own(db: Database, mine: Claim) -> None:
     row = {"run_id": mine.run_id, "kind": "preference", "maturity": 1, "clips": CLIPS, "posted": db.clock()}
     with db.write() as session:

@@ -72,6 +72,7 @@ def test_a_known_question_is_heard_as_its_row_has_it(db: Database, monkeypatch: 
     assert min(kinds["guidance"], kinds["preference"]) > 4
 
 
+@pytest.mark.slow
 @pytest.mark.only("sqlite", "what a worker keeps in memory is the same beside every store")
 def test_a_worker_that_knows_nothing_reads_the_question(db: Database) -> None:
     life = begun(db)

@@ -19,6 +19,7 @@ def languages(tmp_path: Path) -> Languages:
     return Languages(tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("accepted", "tag"),
     [

@@ -162,6 +162,7 @@ def test_what_was_not_recorded_counts_as_the_same() -> None:
     assert changed({**here, "machine": "aarch64"}, here)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("store", "name"),
     [("sqlite", "torch"), ("sqlite", "threads"), ("sqlite", "machine"), ("postgresql", "cpu")],

@@ -53,6 +53,7 @@ def test_requests_are_counted_by_their_route_and_status(client: httpx2.Client, r
     assert found["parenting_request_seconds_count", (route,)] == 3
 
 
+@pytest.mark.slow
 def test_no_label_grows_with_what_is_asked(client: httpx2.Client) -> None:
     client.get("/metrics")
     before = len(figures(client))

@@ -31,6 +31,7 @@ def live(life: RunSession, ticks: int) -> list[list[Any]]:
     return seen
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("world", "config"),
     [

@@ -122,6 +122,7 @@ def test_its_export_has_the_old_bytes_and_the_names(db: Database, settings: Sett
         assert list(json.loads(line))[len(json.loads(before)) :] == NAMES
 
 
+@pytest.mark.slow_after(4)
 @pytest.mark.parametrize("run", RUNS)
 @pytest.mark.parametrize(
     "path", ["/runs/{}", "/runs/{}/parent", "/runs/{}/history", "/runs/{}/why", "/api/v1/runs/{}/queries"]
@@ -154,6 +155,7 @@ def test_without_a_checkpoint_there_is_nothing_to_compare(db: Database) -> None:
         relive(db, 3)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("run", [2, 3])
 def test_it_goes_on_with_the_bits_of_the_old_version(db: Database, same_build: None, run: int) -> None:
     expected = EXPECTED[str(run)]

@@ -70,6 +70,7 @@ def files(written: tuple[bytes, str], tmp_path: Path) -> tuple[Path, Path]:
     return policy, answers
 
 
+@pytest.mark.slow
 def test_a_run_begins_with_both_and_replays(
     db: Database, client: httpx2.Client, files: tuple[Path, Path]
 ) -> None:
@@ -99,6 +100,7 @@ def test_a_run_begins_with_both_and_replays(
     assert "Its X began with" in page
 
 
+@pytest.mark.slow
 @pytest.mark.only("sqlite")
 def test_answers_alone_leave_the_weights_fresh(db: Database, files: tuple[Path, Path]) -> None:
     run = start(db, ISLAND.new("scripted"), origin=read_origin(None, files[1]))
@@ -295,6 +297,6 @@ def test_uploads_are_bounded_in_size_and_number_and_only_from_our_pages(
 def test_a_policy_with_too_few_parameters_is_refused() -> None:
     level = ISLAND.make().levels[0]
     about = {"world": level.world, "levels": [level.text], "config": {}, "stage": 1, "seed": 0}
-    origin = origin_of(("short", pack(bytes(40), "float32", about)), None)
-    ((field, said),) = origin.misfits(level, ISLAND.config)
+    short = origin_of(("short", pack(bytes(40), "float32", about)), None)
+    ((field, said),) = short.misfits(level, ISLAND.config)
     assert (field, said.startswith("It is damaged: a policy for this level has ")) == ("from_policy", True)

@@ -89,6 +89,7 @@ def test_a_name_of_a_level_obeys_the_same_rule(client: httpx2.Client) -> None:
         assert refused.json()["error"]["fields"][0]["field"] == "level_text"
 
 
+@pytest.mark.slow
 def test_whatever_else_people_write_is_shown_as_text_everywhere(client: httpx2.Client, db: Database) -> None:
     for number, text in enumerate(ALLOWED, 1):
         level = f"name: {text}\n\n{LEVEL}"

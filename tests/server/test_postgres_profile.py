@@ -12,6 +12,7 @@ from tests.database import unmigrated
 from tests.services import Stack
 
 
+@pytest.mark.slow
 @pytest.mark.only("postgresql", "SQLite is in tests/test_services.py")
 def test_the_services_do_their_work_on_postgresql(settings: Settings, tmp_path: Path) -> None:
     """It starts three programs, two of which load torch."""

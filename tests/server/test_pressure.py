@@ -225,6 +225,7 @@ class Clock:
         return self.now
 
 
+@pytest.mark.slow
 def test_snapshots_of_all_runs_of_a_worker_take_a_bounded_share_of_its_time(
     db: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -57,6 +57,7 @@ def put(db: Database, tick: int, clips: dict[str, Any]) -> None:
         session.execute(put_there, {"clips": json.dumps(clips), "tick": tick})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", ["unreadable", "changed"])
 def test_answered_questions_come_back_and_the_run_goes_on_with_the_same_bits(
     db: Database, damage: str

@@ -59,6 +59,7 @@ def test_every_piece_is_held_against_its_own() -> None:
     assert differences(other, kept) == ["config"]
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("window", [1, 7, 1000])
 def test_it_is_the_same_in_small_portions(db: Database, monkeypatch: pytest.MonkeyPatch, window: int) -> None:
     monkeypatch.setattr("parenting.server.reads.record.WINDOW", window)

@@ -94,6 +94,7 @@ def by_command(db: Database, client: httpx2.Client) -> None:
     )
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("resume", [by_api, by_page, by_command])
 def test_it_goes_on_with_the_same_bits_and_keeps_its_reason(
     db: Database,
@@ -169,6 +170,7 @@ def end_and_let_the_worker_hear(life: RunSession) -> None:
     held.turn(RUN, worker_side.watch(life.db, [RUN])[RUN])
 
 
+@pytest.mark.slow
 def test_an_ended_run_goes_on_with_the_same_bits_as_if_nobody_had_ended_it(db: Database) -> None:
     end_and_let_the_worker_hear(lived(db, 20))
     runs.set_status(db, RUN, RunStatus.ACTIVE)
@@ -194,6 +196,7 @@ def spoil(db: Database, tick: int) -> None:
         row.sha256 = hashlib.sha256(row.blob).hexdigest()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("spoilt", "expected"), [((30,), 20), ((20, 30), 0)])
 def test_a_checkpoint_whose_hash_fits_and_whose_content_does_not_load_is_passed_over(
     db: Database, client: httpx2.Client, spoilt: tuple[int, ...], expected: int
@@ -215,6 +218,7 @@ def test_a_checkpoint_whose_hash_fits_and_whose_content_does_not_load_is_passed_
     assert len([note for _, note in notes(db, RUN)]) == len(spoilt), "each is said once"
 
 
+@pytest.mark.slow
 def test_a_checkpoint_from_which_the_run_departs_from_its_record_is_passed_over(db: Database) -> None:
     """Its content loads, but is not what was written: here it is that of another run's life."""
     lived(db, 20, 30, to=60)

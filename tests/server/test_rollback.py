@@ -56,6 +56,7 @@ def rows(db: Database, run: int) -> list[int | None]:
         return [session.scalar(select(func.count()).where(table.run_id == run)) for table in tables]
 
 
+@pytest.mark.slow
 def test_it_has_the_same_bits_at_the_tick_and_the_original_stays(
     db: Database, eventful: int, store: str
 ) -> None:

@@ -53,6 +53,7 @@ def replies(settings: Settings, db: Database) -> Iterator[tuple[FastAPI, Counter
     assert any(200 <= status < 300 for status in seen), f"nothing was reached: {seen}"
 
 
+@pytest.mark.slow_after(6)
 @pytest.mark.parametrize(("method", "path"), OPERATIONS)
 def test_every_reply_is_foreseen(method: str, path: str, replies: tuple[FastAPI, Counter[int]]) -> None:
     """Requests are drawn here: `schema.parametrize` would draw all of them in each process that collects."""

@@ -63,6 +63,7 @@ def new(**fields: str) -> NewRun:
     return NewRun.model_validate({**ISLAND.new("scripted").model_dump(), **fields})
 
 
+@pytest.mark.slow
 def test_the_worker_answers_as_the_parent_in_tensors_does_also_after_it_was_taken_up_again(
     db: Database,
 ) -> None:

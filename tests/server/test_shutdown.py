@@ -44,6 +44,7 @@ def stop(child: subprocess.Popen[str], number: signal.Signals) -> None:
     child.wait(60)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", SIGNALS)
 def test_web_stops_with_a_tab_open(data: Path, number: signal.Signals) -> None:
     port = free_port()
@@ -57,6 +58,7 @@ def test_web_stops_with_a_tab_open(data: Path, number: signal.Signals) -> None:
         assert "parenting access open" in told
 
 
+@pytest.mark.slow
 def test_a_request_that_is_still_sent_at_the_end_is_told_to_come_again(data: Path) -> None:
     """The second that it takes is the one that open requests have after the signal."""
     port = free_port()
@@ -75,6 +77,7 @@ def test_a_request_that_is_still_sent_at_the_end_is_told_to_come_again(data: Pat
     assert "[error" not in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", SIGNALS)
 def test_up_stops_both_with_a_tab_open(tmp_path: Path, number: signal.Signals) -> None:
     with parenting("up", "--port", "0", "--no-browser", data=tmp_path) as up:
@@ -116,6 +119,7 @@ def test_up_starts_again_what_dies_and_the_pages_stay(tmp_path: Path) -> None:
         assert not any(alive(child) for child in children)
 
 
+@pytest.mark.slow
 def test_up_ends_with_the_sentence_of_a_wrong_setting(tmp_path: Path) -> None:
     with parenting("up", "--port", "0", "--no-browser", data=tmp_path, PARENTING_TRACKERS="none") as up:
         _, said = up.communicate(timeout=60)
@@ -125,6 +129,7 @@ def test_up_ends_with_the_sentence_of_a_wrong_setting(tmp_path: Path) -> None:
     assert "starts again" not in said
 
 
+@pytest.mark.slow
 def test_web_and_worker_do_not_outlive_up(tmp_path: Path) -> None:
     with parenting("up", "--port", "0", "--no-browser", data=tmp_path) as up:
         assert up.stdout is not None
@@ -141,6 +146,7 @@ def said(*arguments: str, data: Path, code: int = 2, environment: Mapping[str, s
     return ended.said()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["up", "web"])
 def test_port_in_use_is_told_in_a_sentence(data: Path, command: str) -> None:
     with socket.create_server(("127.0.0.1", 0)) as listener:
@@ -151,6 +157,7 @@ def test_port_in_use_is_told_in_a_sentence(data: Path, command: str) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_log_folder_that_cannot_be_is_told_before_the_address(data: Path) -> None:
     told = said("up", "--port", "0", data=data, environment={"PARENTING_LOG_FOLDER": "/proc/x"})
     assert re.fullmatch(

@@ -40,6 +40,7 @@ def rewrite(db: Database, change: Callable[[Snapshot], Snapshot]) -> None:
         row.sha256 = hashlib.sha256(row.blob).hexdigest()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("run")
 def test_a_sound_run_is_sound(db: Database, settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
     found = verify(db, RUN)
@@ -54,6 +55,7 @@ def test_a_sound_run_is_sound(db: Database, settings: Settings, monkeypatch: pyt
     assert (said.exit_code, shown["sound"], shown["bits"]["equal"], shown["x"]) == (0, True, True, None)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("run")
 def test_a_piece_that_differs_is_named(db: Database) -> None:
     def other_policy(saved: Snapshot) -> Snapshot:
@@ -66,6 +68,7 @@ def test_a_piece_that_differs_is_named(db: Database) -> None:
     assert (found.sound, found.replayed.differ, found.x) == (False, ["learner.params"], None)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("run")
 def test_an_x_that_is_not_its_answers_is_named(db: Database) -> None:
     def other_x(saved: Snapshot) -> Snapshot:

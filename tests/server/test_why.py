@@ -53,6 +53,7 @@ def questions(db: Database, run_id: int) -> dict[int, Query]:
         return {row.tick: row for row in session.scalars(asked)}
 
 
+@pytest.mark.slow
 def test_a_killed_worker_writes_the_same_reasons_and_effects(db: Database) -> None:
     """Also those that were due when it was killed, of answers from before its checkpoint."""
     life = begun(db, parent="scripted")

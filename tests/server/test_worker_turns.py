@@ -59,6 +59,7 @@ def slow(monkeypatch: pytest.MonkeyPatch, name: str, run: int, gate: threading.E
     monkeypatch.setattr(RunSession, name, slowly)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("name", ["__init__", "tick", "report_waiting", "save"])
 def test_a_run_that_takes_long_holds_up_no_other(
     db: Database, worker: Worker, monkeypatch: pytest.MonkeyPatch, gate: threading.Event, name: str
@@ -118,6 +119,7 @@ def test_a_hung_run_loses_its_claim_and_another_worker_takes_it(
     rounds(worker, lambda: set(worker.claims) == {fine})  # its next write told it
 
 
+@pytest.mark.slow
 def test_a_run_that_waits_has_no_turn_without_news(
     db: Database, settings: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -135,6 +137,7 @@ def test_a_run_that_waits_has_no_turn_without_news(
     assert begun == []
 
 
+@pytest.mark.slow
 def test_what_the_store_refuses_one_run_does_not_stop_the_others(
     db: Database, settings: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -40,6 +40,7 @@ def rules(of: Toy) -> TableRules:
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.torture
 @pytest.mark.parametrize("of", length([SLIPPERY], list(WORLDS)))
 def test_each_has_what_every_world_has(of: Toy) -> None:

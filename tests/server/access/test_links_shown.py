@@ -74,6 +74,7 @@ def is_refused(rule: Rule, role: Role, confined: bool) -> bool:
     return role not in rule.roles or (confined and rule.where == "everything")
 
 
+@pytest.mark.slow_after(5)
 @pytest.mark.parametrize("status", [RunStatus.ACTIVE, RunStatus.PAUSED, RunStatus.STOPPED])
 @pytest.mark.parametrize(("role", "page", "confined"), PLACES)
 def test_no_page_offers_what_is_refused(

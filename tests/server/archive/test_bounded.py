@@ -67,6 +67,7 @@ def peaks(folder: Path, answers: int) -> Iterator[int]:
         db.close()
 
 
+@pytest.mark.slow
 def test_more_answers_need_no_more_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for module, name in ROWS:
         monkeypatch.setattr(module, name, 10)

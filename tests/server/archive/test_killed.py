@@ -84,6 +84,7 @@ def end(code: str, data: Path, path: Path, row: int) -> int:
     ).returncode
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["out", "out.zip"])
 def test_an_export_that_was_killed_leaves_no_name_and_begins_again(
     db: Database, five: list[int], settings: Settings, tmp_path: Path, name: str

@@ -59,6 +59,7 @@ def export(db: Database, path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_minari_reads_every_step_as_it_was_lived(
     db: Database, lived: tuple[Run, list[Any]], tmp_path: Path
 ) -> None:
@@ -80,6 +81,7 @@ def test_minari_reads_every_step_as_it_was_lived(
     assert [(row["first"], row["end"]) for row in told] == [(one.first, one.end) for one in found]
 
 
+@pytest.mark.slow
 def test_its_environment_makes_the_same_steps(
     db: Database, lived: tuple[Run, list[Any]], tmp_path: Path
 ) -> None:
@@ -96,6 +98,7 @@ def test_its_environment_makes_the_same_steps(
     assert env.unwrapped.world.time_limit == 12
 
 
+@pytest.mark.slow
 def test_the_command_writes_the_same_and_replaces_nothing(
     db: Database, lived: tuple[Run, list[Any]], tmp_path: Path
 ) -> None:

@@ -82,6 +82,7 @@ def require(command: list[str], what: str) -> None:
         pytest.skip(f"{what} is not installed; PARENTING_READERS names a Python that has it")
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("name", READ)
 def test_five_exports_are_one_table(name: str, folders: list[str], tmp_path: Path) -> None:
     require([PYTHON, "-c", f"import importlib.util as u, sys; sys.exit(u.find_spec({name!r}) is None)"], name)

@@ -41,6 +41,7 @@ def are_ended(settings: Settings, name: str) -> bool:
         db.close()
 
 
+@pytest.mark.slow
 def test_a_dump_brings_the_database_back_and_the_former_one_is_kept(
     settings: Settings, db: Database, guidance: int, tmp_path: Path
 ) -> None:

@@ -142,6 +142,7 @@ def test_a_source_in_use_is_refused_unless_a_moment_of_it_will_do(
     assert "2 runs" in str(copy(home, there, tmp_path, snapshot=True))
 
 
+@pytest.mark.slow
 def test_a_source_that_somebody_changes_meanwhile_is_refused_and_may_be_copied_again(
     store: str, home: str, place: Callable[[str], str], opened: Open, tmp_path: Path
 ) -> None:
@@ -191,6 +192,7 @@ def test_a_copy_that_is_not_equal_is_refused(
     copy(home, there, tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.only("sqlite", "PostgreSQL lets no such value in")
 def test_a_damaged_value_is_named_and_nothing_is_copied(
     settings: Settings, home: str, place: Callable[[str], str], tmp_path: Path

@@ -196,6 +196,7 @@ def test_body_that_pauses_is_cut_off_before_its_deadline() -> None:
         assert status(reply) == 408
 
 
+@pytest.mark.slow
 def test_large_reply_on_a_slow_line_comes_whole() -> None:
     with serving(replace(SHORT, unread_seconds=0.4, unread_bytes=1)) as connect, closing(connect()) as client:
         client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 65_536)

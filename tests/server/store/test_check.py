@@ -74,6 +74,7 @@ def test_random_bytes_are_refused(file: Path, size: int) -> None:
         connect(Settings(data=file.parent, database_url=None))
 
 
+@pytest.mark.slow
 @pytest.mark.torture
 def test_flipped_bits_are_a_sentence_or_the_rows_own(file: Path) -> None:
     """Each flip is refused at the start, or leaves a file in which everything can be read or said."""
@@ -133,6 +134,7 @@ COMMANDS = (
 )
 
 
+@pytest.mark.slow_after(6)
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
 @pytest.mark.parametrize("kind", ["random", "empty", "folder", "missing"])
 def test_every_command_ends_with_a_sentence_and_2(

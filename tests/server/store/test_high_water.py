@@ -59,6 +59,7 @@ def killed_after(data: Path, mine: Claim, start: int, answers: int) -> int:
     return max([last, *rest])
 
 
+@pytest.mark.slow
 def test_lost_log_is_noticed_and_accepted(db: Database, mine: Claim, settings: Settings) -> None:
     file, log = settings.data / "parenting.db", settings.data / "parenting.db-wal"
     db.close()
@@ -80,6 +81,7 @@ def test_lost_log_is_noticed_and_accepted(db: Database, mine: Claim, settings: S
     connect(settings).close()
 
 
+@pytest.mark.slow
 def test_no_kill_raises_a_false_alarm(db: Database, mine: Claim, settings: Settings) -> None:
     db.close()
     for start, answers in ((1, 1), (20_000, 4), (40_000, 9)):
@@ -214,6 +216,7 @@ def test_missing_database_is_not_made_anew_in_silence(db: Database, mine: Claim,
     connect(settings).close()
 
 
+@pytest.mark.slow
 def test_file_put_beside_the_log_of_another_is_not_opened(
     db: Database, mine: Claim, settings: Settings, tmp_path: Path
 ) -> None:

@@ -255,6 +255,7 @@ def test_of_many_who_migrate_at_once_one_does(settings: Settings) -> None:
             one.close()
 
 
+@pytest.mark.slow
 def test_a_migration_may_take_longer_than_other_writes(
     db: Database, settings: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -43,6 +43,7 @@ def open_to_others(folder: Path) -> list[str]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("careless")
 def test_processes_make_files_of_the_owners_in_a_folder_of_everybody(tmp_path: Path) -> None:
     data = tmp_path / "data"

@@ -51,6 +51,7 @@ def raised(db: Database, settings: Settings, run: int) -> Worker:
     return worker
 
 
+@pytest.mark.slow
 @pytest.mark.only("sqlite")
 def test_a_worker_feeds_what_it_measures_and_no_tracker_holds_it_up(
     db: Database, settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -75,6 +76,7 @@ def test_a_wrong_setting_is_told_before_the_worker_begins(db: Database, settings
         Worker(db, settings.model_copy(update={"trackers": "nothing"}))
 
 
+@pytest.mark.slow
 def test_a_training_has_the_same_bits_with_a_tracker_that_hangs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -76,6 +76,7 @@ def test_the_same_seed_walks_the_same_way_and_another_one_does_not(db: Database,
     assert (other or {})["clip"]["actions"] != (walks[0] or {})["clip"]["actions"]
 
 
+@pytest.mark.slow
 @ONE_STORE
 def test_a_life_is_the_same_with_and_without_walks(
     db: Database, worker: Worker, monkeypatch: pytest.MonkeyPatch

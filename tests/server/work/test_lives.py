@@ -91,6 +91,7 @@ def test_lives_that_come_back_go_on_as_if_they_had_never_left(db: Database, sett
     worker._close()
 
 
+@pytest.mark.slow
 def test_runs_that_wait_are_not_taken_up_beyond_what_memory_should_hold(
     db: Database, settings: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -117,6 +118,7 @@ def test_runs_that_wait_are_not_taken_up_beyond_what_memory_should_hold(
     worker._close()
 
 
+@pytest.mark.slow
 def test_the_least_recently_used_life_leaves_first(db: Database, settings: Settings) -> None:
     runs, worker = begin(db, 3), Worker(db, few(settings, 2))
     rounds(worker, lambda: all(look(db, [run])[run].open_guidance for run in runs))
@@ -140,6 +142,7 @@ def test_lives_leave_before_their_next_checkpoint_is_due(
     worker._close()
 
 
+@pytest.mark.slow
 @pytest.mark.only("sqlite", "no statement of the store is new in it")
 def test_runs_that_begin_wait_until_others_have_left_memory(db: Database, settings: Settings) -> None:
     """Else all would be there for a moment, and that memory is not given back."""
@@ -167,6 +170,7 @@ def test_runs_that_cannot_leave_hold_up_no_other(
     worker._close()
 
 
+@pytest.mark.slow
 def test_a_run_that_sleeps_comes_for_an_event_though_memory_is_full(db: Database, settings: Settings) -> None:
     runs, worker = begin(db, 2), Worker(db, few(settings, 1))
     rounds(worker, lambda: all(look(db, [run])[run].open_guidance for run in runs))
