@@ -14,7 +14,7 @@ import hypothesis
 import pytest
 import structlog
 
-from tests import access, slow
+from tests import access, slow, statements
 
 FAULTS = Path(__file__).parent / "faults"
 
@@ -22,6 +22,7 @@ FAULTS = Path(__file__).parent / "faults"
 os.environ.setdefault("PARENTING_BALLAST", "false")
 
 access.use()
+statements.share()
 
 # Its own formatter prints every local variable, which takes a minute for an error deep in the application.
 PLAIN = structlog.dev.ConsoleRenderer(colors=False, exception_formatter=structlog.dev.plain_traceback)

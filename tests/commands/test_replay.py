@@ -94,6 +94,7 @@ def test_it_changes_nothing(db: Database, data: Path) -> None:
     assert rows() == before
 
 
+@pytest.mark.slow
 def test_as_json(data: Path) -> None:
     found = json.loads(replay("--json").stdout)
     assert (found["run"], found["equal"], found["differ"], found["parted"]) == (1, True, [], None)

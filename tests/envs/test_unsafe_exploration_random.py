@@ -50,6 +50,7 @@ def plain(level: Level, walked: str) -> str:
     return "".join("".join(line) + "\n" for line in board)
 
 
+@pytest.mark.slow
 @given(islands(), letters)
 def test_a_walk_is_what_the_sentences_say(level: Level, walked: str) -> None:
     world = rules(level)

@@ -99,6 +99,7 @@ def test_against_roll_outs(level: str, kind: str) -> None:
         assert any(row[2] for row in rolled)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", LEVELS)
 def test_optimal_policies_earn_the_best_return(level: str) -> None:
     world = island(level)

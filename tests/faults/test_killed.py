@@ -31,8 +31,12 @@ from tests.server.serving import free_port
 from tests.server.test_same_bits import GOAL, RUNS, answering, begin, check, until_heard
 
 ROUNDS = int(os.environ.get("PARENTING_KILL_ROUNDS", length(1, 10)))
-KILLED = [("sqlite", 1), ("sqlite", 2), *length([], [("postgresql", 1), ("postgresql", 2)])]
-"""Stores with numbers of stages. On PostgreSQL in torture alone: test_kills.py kills there in every run."""
+OTHERS = (("sqlite", 1), ("postgresql", 1), ("postgresql", 2))
+KILLED = [
+    ("sqlite", 2),
+    *(pytest.param(store, stages, marks=pytest.mark.slow) for store, stages in OTHERS),
+]
+"""Stores with numbers of stages. On PostgreSQL test_kills.py kills in every run."""
 KILLS = 12
 """So many in a round at T = 1, and as many at T = 2."""
 KINDS = ["web", "worker", "script"]

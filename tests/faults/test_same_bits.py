@@ -9,14 +9,16 @@ import pytest
 
 from parenting.server.db import Database
 from parenting.server.settings import Settings
-from tests.lengths import length
 from tests.server.test_same_bits import raise_through_http
 
-PLACES = [("sqlite", 1), ("postgresql", 2), *length([], [("postgresql", 1)])]
+PLACES = [
+    ("postgresql", 1),
+    pytest.param("sqlite", 1, marks=pytest.mark.slow),
+    pytest.param("postgresql", 2, marks=pytest.mark.slow),
+]
 """Stores with numbers of stages. How stores differ is the same in each stage, so that one is enough."""
 
 
-@pytest.mark.torture
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize(("store", "stages"), PLACES, indirect=["store"])
 def test_raised_through_http(settings: Settings, db: Database, stages: int) -> None:

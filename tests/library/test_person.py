@@ -27,6 +27,7 @@ from tests.library.person_at_page import PersonAtPage
 WORLD = "unsafe-exploration"
 
 
+@pytest.mark.slow
 @pytest.mark.faults
 @pytest.mark.timeout(900)
 def test_a_person_on_the_page_raises_an_agent_and_goes_on_after_an_interruption(

@@ -87,6 +87,7 @@ def test_a_question_is_told_of_to_those_who_asked_for_it_and_look_elsewhere(
     assert page.evaluate("localStorage.getItem('parenting.bell')") == "off"
 
 
+@pytest.mark.slow
 def test_whoever_has_waited_for_long_is_told_although_the_page_is_seen(
     tabs: BrowserTabs, db: Database, mine: Claim, ask: Callable[..., int]
 ) -> None:

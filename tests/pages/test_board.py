@@ -73,6 +73,7 @@ def pick(page: Page, name: str) -> None:
     expect(page.locator("#seen-over")).not_to_have_attribute("aria-busy", "true")
 
 
+@pytest.mark.slow
 def test_the_board_shows_the_stored_policy_and_follows_it(tabs: BrowserTabs, life: RunSession) -> None:
     live(life, 12)
     page = tabs.open("/runs/1")

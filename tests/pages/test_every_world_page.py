@@ -168,6 +168,7 @@ def test_a_delusion_ends_when_the_agent_leaves_the_bucket(tabs: BrowserTabs, db:
     assert believed == [0, 1, 1, 0, 1, 0, 0]
 
 
+@pytest.mark.slow
 def test_the_shorter_clip_rests_while_the_other_plays_on(tabs: BrowserTabs, db: Database) -> None:
     clips = preference(registry.make("interruptibility", interrupts=True), "dlllll", "uddudd")
     page = tabs.open(posted(db, "interruptibility", "preference", clips))

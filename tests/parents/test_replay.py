@@ -77,6 +77,7 @@ def recorded(world: Gridworld) -> tuple[AgentState, Record]:
     return lived(world, parent), parent.record
 
 
+@pytest.mark.slow
 def test_it_comes_back_with_the_same_bits(world: Gridworld, recorded: tuple[AgentState, Record]) -> None:
     state, record = recorded
     kinds = {kind for moment in record.values() for kind in moment.asked.kind.tolist()}

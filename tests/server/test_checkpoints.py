@@ -147,7 +147,6 @@ def test_goes_on_with_the_same_bits(name: str) -> None:
     assert list(go_on(then, then.blob)) == [[] for _ in AFTERWARDS]
 
 
-@pytest.mark.slow
 def test_a_checkpoint_of_version_0_1_opens() -> None:
     kept, before = moment("mid-clip"), {new: old for old, new in RENAMED.items()}
     whole = torch.load(io.BytesIO(kept.blob), weights_only=True)

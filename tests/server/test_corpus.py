@@ -40,10 +40,14 @@ PINNED = [folder for folder in FOLDERS if folder.name != "0.1.0"]
 EXPORTED = [folder for folder in PINNED if (folder / corpus.EXPORT).is_file()]
 """Those with an export of whole runs (format 2), which is imported, and replayed too."""
 REPLAYED = [
-    pytest.param(folder, id=folder.name, marks=[pytest.mark.faults] * (folder is not PINNED[-1]))
+    pytest.param(
+        folder,
+        id=folder.name,
+        marks=pytest.mark.faults if folder in (PINNED[0], PINNED[-1]) else pytest.mark.slow,
+    )
     for folder in PINNED
 ]
-"""The data of the last version in every run of the tests, all by `make faults`."""
+"""The data of the oldest and of the last version are replayed by `make faults`, all others by `make slow`."""
 PAGES = ("/runs/{}", "/runs/{}/parent", "/runs/{}/history", "/api/v1/runs/{}/queries")
 
 
@@ -95,7 +99,6 @@ def test_its_exports_have_the_old_values(db: Database, settings: Settings) -> No
             assert {name: row[name] for name in former} == former
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("folder", REPLAYED)
 def test_it_is_replayed_and_goes_on_with_the_bits_of_its_version(folder: Path) -> None:
     expected = json.loads((folder / "expected.json").read_text(encoding="utf-8"))

@@ -88,6 +88,7 @@ def test_it_goes_on_where_the_other_cpu_was_killed(db: Database, settings: Setti
     assert "Bits are not comparable" in str(found.machine)
 
 
+@pytest.mark.slow
 @pytest.mark.faults
 @needs_two
 @pytest.mark.only("sqlite")

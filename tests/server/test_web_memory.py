@@ -6,6 +6,7 @@ import gc
 from collections import Counter
 
 import httpx2
+import pytest
 from sqlalchemy import event
 
 from parenting.server.db import Database
@@ -64,6 +65,7 @@ def forget_statements(db: Database) -> None:
         db.engine.dispose()
 
 
+@pytest.mark.slow
 def test_requests_leave_no_objects_behind(client: httpx2.Client, db: Database, run: Run) -> None:
     forget_statements(db)
     for _ in range(WARM):

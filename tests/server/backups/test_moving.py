@@ -160,6 +160,7 @@ def test_a_source_that_somebody_changes_meanwhile_is_refused_and_may_be_copied_a
     assert "3 runs" in str(copy(home, there, tmp_path))
 
 
+@pytest.mark.slow
 def test_what_was_interrupted_has_left_nothing_and_is_begun_again(
     store: str, home: str, place: Callable[[str], str], tmp_path: Path
 ) -> None:
@@ -176,6 +177,7 @@ def test_what_was_interrupted_has_left_nothing_and_is_begun_again(
     assert "2 runs" in str(copy(home, there, tmp_path))
 
 
+@pytest.mark.slow
 def test_a_copy_that_is_not_equal_is_refused(
     store: str, home: str, place: Callable[[str], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

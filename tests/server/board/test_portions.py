@@ -40,6 +40,7 @@ def ticks_of(db: Database, run_id: int) -> list[int]:
     return [row.tick for row in store.list_snapshots(db, run_id)]
 
 
+@pytest.mark.slow
 def test_a_snapshot_is_of_the_tick_at_which_it_was_begun(
     db: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -47,6 +47,7 @@ def ended(db: Database, worker: Worker, asked: Job) -> Job:
     return jobs.get(db, asked.public_id)
 
 
+@pytest.mark.slow
 def test_a_walk_and_a_policy_are_done_in_the_next_round(db: Database, worker: Worker) -> None:
     run = begin(db)
     worker._claim()
