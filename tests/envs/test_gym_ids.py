@@ -62,6 +62,7 @@ def test_a_world_of_ones_own_has_an_id_whatever_comes_first(order: list[str]) ->
     assert run("\n".join([*(steps[one] for one in order), made])) == "-1.0"
 
 
+@pytest.mark.slow
 @pytest.mark.faults
 def test_many_processes() -> None:
     """Each spawned process finds the worlds by the module. Three processes load torch."""

@@ -114,6 +114,7 @@ def test_without_dask_it_says_what_to_install(tmp_path: Path, monkeypatch: pytes
     assert "pip install 'parenting[dask]'" in said.output
 
 
+@pytest.mark.slow
 @pytest.mark.faults
 @pytest.mark.usefixtures("cluster")  # its workers, too, find this module by its name
 def test_a_scheduler_that_goes_away_costs_what_is_in_work_alone(

@@ -208,6 +208,7 @@ def test_a_worker_that_dies_costs_its_piece_only(store: Store, tmp_path: Path) -
     assert again < len(others)  # those that were in work beside it
 
 
+@pytest.mark.slow
 @pytest.mark.faults
 @pytest.mark.usefixtures("importable")
 def test_workers_that_always_die_are_said_and_all_else_is_done(store: Store) -> None:

@@ -31,7 +31,7 @@ pytestmark = [
     pytest.mark.timeout(length(1800, 20000)),
     pytest.mark.only("sqlite", "PostgreSQL has checksums of its own for its pages"),
 ]
-FLIPS = length(30, 20_000)
+FLIPS = length(20, 20_000)
 ANSWERS = 24
 SAID = {"refused at the start", "the damage is said, the rest goes on"}
 GROUP = "flips of bits in the files of a database"

@@ -76,7 +76,7 @@ class Recording:
         return told_in(b"".join(call.data for call in self.told if call.ended <= instant))
 
 
-@pytest.fixture(params=IMAGES)
+@pytest.fixture(params=["full", "normal", pytest.param("off", marks=pytest.mark.slow)])
 def level(request: pytest.FixtureRequest) -> str:
     name: str = request.param
     return name

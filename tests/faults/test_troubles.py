@@ -146,6 +146,7 @@ def test_a_full_disk_is_waited_for(
         figures.count("troubles of the store", f"a full disk for {FULL_SECONDS:g} s")
 
 
+@pytest.mark.slow
 @pytest.mark.only("sqlite", "PostgreSQL's files are its server's own")
 def test_a_limit_on_the_size_of_files_is_waited_for(
     settings: Settings, store: str, db: Database, rng: random.Random, figures: Figures

@@ -53,6 +53,7 @@ def until(met: Callable[[], bool], worker: Command) -> None:
         time.sleep(0.05)
 
 
+@pytest.mark.slow
 def test_a_lock_of_another_program_neither_ends_the_worker_nor_fails_the_run(
     settings: Settings, db: Database
 ) -> None:

@@ -19,7 +19,7 @@ from tests.lengths import length
 from tests.server.conftest import Clock
 from tests.server.refusing import SAID, Refusal, hold, raised_on
 
-STEP = {"sqlite": length(short=9, long=1), "postgresql": length(short=81, long=3)}
+STEP = {"sqlite": length(short=17, long=1), "postgresql": length(short=81, long=3)}
 """One in so many statements, from a drawn one on."""
 KINDS = length(short=1, long=len(SAID))
 """Kinds of refusals at each."""

@@ -230,6 +230,7 @@ def test_pages_may_be_framed_only_by_whom_the_settings_name(tmp_path: Path) -> N
             assert client.get("/").headers["Content-Security-Policy"].endswith(expected)
 
 
+@pytest.mark.slow
 @pytest.mark.faults
 @pytest.mark.timeout(900)
 def test_a_server_that_runs_already_is_joined_and_left_running(

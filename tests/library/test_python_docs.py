@@ -68,6 +68,7 @@ def test_a_section_runs_and_prints_what_it_shows(title: str, empty_folder: Path)
         run_section(SECTIONS[title])
 
 
+@pytest.mark.slow
 @pytest.mark.faults
 @pytest.mark.timeout(900)
 def test_a_person_answers_on_the_page_and_at_the_terminal(

@@ -20,6 +20,7 @@ LYING = 3
 browser has six connections, so an answer finds a free one at once, however many windows are open."""
 
 
+@pytest.mark.slow
 @pytest.mark.faults
 @pytest.mark.torture
 def test_parents_windows_and_dashboards_of_one_browser_leave_connections_for_answers(

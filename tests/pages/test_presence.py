@@ -41,6 +41,7 @@ def test_a_question_is_taken_over_and_the_other_page_says_so(
     expect(laptop.get_by_role("heading", name="The agent is exploring")).to_be_visible()
 
 
+@pytest.mark.slow
 @pytest.mark.faults
 def test_a_question_comes_to_who_waits_once_the_last_tab_that_shows_it_is_left(
     tabs: BrowserTabs, ask: Callable[..., int]

@@ -73,6 +73,7 @@ def check(db: Database, run: int, begun: Begun) -> None:
     assert int(expected.saved.state.maturity) == begun.config.max_clip_length
 
 
+@pytest.mark.slow
 @pytest.mark.faults
 @pytest.mark.timeout(900)
 @pytest.mark.only("sqlite", "tests/faults/test_same_bits.py does the same on PostgreSQL")
