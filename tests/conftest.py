@@ -80,7 +80,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     This is not done when this file is read, for the process that only hands out tests needs no torch. What
     the modules have made by now stays; the garbage collector need not look through it again and again.
     """
-    slow.mark_later_cases(items)
+    slow.mark_slow_cases(items)
     import torch
 
     torch.set_num_threads(1)

@@ -1,7 +1,10 @@
 """Tests that are too long for every run: `make slow` does them alone, and `make torture` too.
 
 `@pytest.mark.slow` stands above such a test. `@pytest.mark.slow_after(2)` stands above one with many cases:
-the first two, on each store, are done in every run, and the others are slow.
+the first two, on each store, are done in every run, and the others are slow. One that is slow on PostgreSQL
+alone bears `@pytest.mark.slow_on("postgresql")`.
+
+Of a test of the server that is done again on PostgreSQL, two cases are done there in every run.
 """
 
 from collections import Counter
@@ -9,18 +12,25 @@ from collections.abc import Iterable
 
 import pytest
 
-MARK, AFTER = "slow", "slow_after"
+MARK, AFTER, ON = "slow", "slow_after", "slow_on"
+AGAIN = 2
+"""Cases of each test that are done again on PostgreSQL in every run."""
 
 
-def mark_later_cases(items: Iterable[pytest.Item]) -> None:
-    """Mark the later cases of tests that bear `slow_after`."""
+def mark_slow_cases(items: Iterable[pytest.Item]) -> None:
+    """Mark the cases that the marks of their tests leave to `make slow`."""
     seen = Counter[tuple[str, object]]()
     for item in items:
-        after = item.get_closest_marker(AFTER)
-        if after is None:
-            continue
         case = getattr(item, "callspec", None)
-        test = (item.nodeid.partition("[")[0], case.params.get("store") if case else None)
+        store = case.params.get("store") if case else None
+        test = (item.nodeid.partition("[")[0], store)
         seen[test] += 1
-        if seen[test] > after.args[0]:
+        if seen[test] > _cases(item) or any(store in mark.args for mark in item.iter_markers(ON)):
             item.add_marker(MARK)
+
+
+def _cases(item: pytest.Item) -> float:
+    """The number of cases of this test, on one store, that every run does."""
+    after = item.get_closest_marker(AFTER)
+    again = item.get_closest_marker("postgresql") and not item.get_closest_marker("faults")
+    return min(after.args[0] if after else float("inf"), AGAIN if again else float("inf"))

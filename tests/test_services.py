@@ -71,6 +71,7 @@ def until_raised(run: str, answers: int) -> dict[str, Any]:
         time.sleep(0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.faults
 @pytest.mark.timeout(900)
 def test_the_services_raise_an_agent_and_stop(

@@ -21,6 +21,7 @@ CHANCE = length(4, 0)
 A worker that prefers runs gives some a hundred times as many, but only seconds of a crowd show it."""
 
 
+@pytest.mark.slow_on("postgresql")
 def test_of_equal_runs_none_is_served_far_more_than_another(
     settings: Settings, db: Database, figures: Figures
 ) -> None:

@@ -11,14 +11,11 @@ from parenting.server.db import Database
 from parenting.server.settings import Settings
 from tests.server.test_same_bits import raise_through_http
 
-PLACES = [
-    ("postgresql", 1),
-    pytest.param("sqlite", 1, marks=pytest.mark.slow),
-    pytest.param("postgresql", 2, marks=pytest.mark.slow),
-]
+PLACES = [("sqlite", 1), ("postgresql", 1), ("postgresql", 2)]
 """Stores with numbers of stages. How stores differ is the same in each stage, so that one is enough."""
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize(("store", "stages"), PLACES, indirect=["store"])
 def test_raised_through_http(settings: Settings, db: Database, stages: int) -> None:

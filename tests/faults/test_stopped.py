@@ -33,6 +33,7 @@ def hold(house: House, runs: list[int]) -> None:
         assert rebuild(house.store, run) == []
 
 
+@pytest.mark.slow_on("postgresql")
 def test_worker_stopped_inside_a_write_ends_nobody(
     settings: Settings, db: Database, rng: random.Random, figures: Figures
 ) -> None:
@@ -58,6 +59,7 @@ def test_worker_stopped_inside_a_write_ends_nobody(
         hold(house, runs)
 
 
+@pytest.mark.slow_on("postgresql")
 def test_client_learns_the_truth_after_a_lost_reply(
     settings: Settings, db: Database, rng: random.Random, figures: Figures
 ) -> None:

@@ -41,7 +41,7 @@ from tests.server.raising import ISLAND
 pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(1800, 3000))]
 WEBS, WORKERS = length((1, 1), (2, 3))
 LOCKED_SECONDS = 20.0
-FULL_SECONDS = length(10.0, 120.0)
+FULL_SECONDS = length(7.0, 120.0)
 HELD, HELD_SECONDS = length(0, 15), 2.0
 RESTARTS, ENDED = length(1, 15), length(2, 60)
 STOPS = 30
@@ -117,6 +117,7 @@ def elsewhere(folder: Path, tmp_path: Path) -> Iterator[tuple[Settings, Database
     db.close()
 
 
+@pytest.mark.slow_on("postgresql")
 def test_a_lock_of_another_program_is_waited_for(
     settings: Settings, store: str, db: Database, rng: random.Random, figures: Figures
 ) -> None:

@@ -45,6 +45,7 @@ def answer(page: Page, choice: str) -> None:
     page.locator(f".answers [value={choice}]").click()
 
 
+@pytest.mark.slow
 @pytest.mark.faults
 @pytest.mark.timeout(300)
 def test_from_start_to_stop(tabs: BrowserTabs, db: Database, worker: Worker) -> None:

@@ -66,6 +66,7 @@ def changes(db: Database) -> list[tuple[int, MachineChanged]]:
 needs_two = pytest.mark.skipif(HERE == "DEFAULT", reason="this CPU has no vector instructions to leave out")
 
 
+@pytest.mark.slow
 @pytest.mark.faults
 @needs_two
 @pytest.mark.only("sqlite")
@@ -114,6 +115,7 @@ def test_the_other_way_and_killed_again_within_the_record(db: Database, settings
     assert verify(db, RUN).x is None
 
 
+@pytest.mark.slow_on("postgresql")
 @pytest.mark.faults
 def test_recorded_questions_stand_where_the_agent_would_ask_others(
     db: Database, followed: list[int], monkeypatch: pytest.MonkeyPatch

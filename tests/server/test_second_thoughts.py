@@ -155,6 +155,7 @@ def tallied(standing: list[Said]) -> tuple[list[int], list[int], int]:
     return kinds, choices, len(standing) - len(told)
 
 
+@pytest.mark.slow
 @pytest.mark.faults
 @pytest.mark.torture
 @pytest.mark.parametrize("seed", length([1], [1, 2, 3, 4]))

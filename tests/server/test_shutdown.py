@@ -97,6 +97,7 @@ def test_up_stops_both_with_a_tab_open(tmp_path: Path, number: signal.Signals) -
         assert "Traceback" not in up.communicate()[1]
 
 
+@pytest.mark.slow
 @pytest.mark.faults
 def test_up_starts_again_what_dies_and_the_pages_stay(tmp_path: Path) -> None:
     """Both are killed; the address that was printed answers again, and a signal still stops everything."""
