@@ -34,6 +34,15 @@ def test_its_test_is_there(mutant: Mutant) -> None:
     assert name.partition("[")[0] in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
 
 
+@pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.name)
+def test_its_test_is_done_in_every_run(mutant: Mutant) -> None:
+    file, _, name = mutant.test.partition("::")
+    tree = ast.parse((ROOT / file).read_text(encoding="utf-8"))
+    (test,) = (one for one in tree.body if getattr(one, "name", None) == name.partition("[")[0])
+    assert isinstance(test, ast.FunctionDef)
+    assert "pytest.mark.slow" not in map(ast.unparse, test.decorator_list)
+
+
 @pytest.fixture
 def tree(tmp_path: Path) -> Path:
     """A program of one line and its tests, of which one sees a fault and one does not."""

@@ -18,17 +18,37 @@ from reference.parenting import Reference
 from tests.agent.batched_runs import Judge, as_query, layers, lenient_parent, run_batch
 from tests.agent.coverage_of_events import EventCoverage
 from tests.agent.scenarios import OWN, Scenario, scenarios
+from tests.mutants import MUTANTS
 
 TRIALS, SEED = 2, 7
 SCENARIOS = scenarios()
+FIRST = (
+    "unsafe-exploration, scripted",
+    "unsafe-exploration, random",
+    "reward-hacking, scripted",
+    "side-effects, random",
+    "absent-supervisor, scripted",
+    "direct",
+    "seldom trained",
+    "levels that look alike",
+    "own length, guided",
+    "frugal, confirmed",
+    "relabelled, confirmed",
+)
+"""Every run compares these. The mutants of tests/mutants name no others."""
 
 
 def test_every_world_is_compared() -> None:
     assert set(OWN) == set(registry.WORLDS)
 
 
-@pytest.mark.slow_after(5)
-@pytest.mark.parametrize("name", list(SCENARIOS))
+def test_mutants_name_cases_of_every_run() -> None:
+    tests = [mutant.test for mutant in MUTANTS if "test_same_query_log_and_parameters" in mutant.test]
+    assert {test.partition("[")[2].rstrip("]") for test in tests} <= set(FIRST) <= set(SCENARIOS)
+
+
+@pytest.mark.slow_after(len(FIRST))
+@pytest.mark.parametrize("name", sorted(SCENARIOS, key=lambda name: name not in FIRST))
 def test_same_query_log_and_parameters(name: str) -> None:
     scenario = SCENARIOS[name]
     world, config, happened = scenario.rules(), scenario.config(), EventCoverage()

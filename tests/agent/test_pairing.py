@@ -71,7 +71,7 @@ def take(recorder: Recorder, found: Pair) -> None:
     ring.stored[one] = ring.stored[other] = False
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("recompare", [False, True])
 @pytest.mark.parametrize("seed", range(4))
 def test_search_finds_what_a_plain_search_finds(seed: int, recompare: bool) -> None:

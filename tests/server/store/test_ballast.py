@@ -75,7 +75,6 @@ def until_refused(db: Database, mine: Claim, first: int, most: int) -> tuple[lis
     return told, False
 
 
-@pytest.mark.slow
 def test_disk_that_fills_up_costs_one_refusal_until_the_ballast_is_used_up(
     full: Database, small_disk: Path
 ) -> None:

@@ -59,7 +59,6 @@ def killed_after(data: Path, mine: Claim, start: int, answers: int) -> int:
     return max([last, *rest])
 
 
-@pytest.mark.slow
 def test_lost_log_is_noticed_and_accepted(db: Database, mine: Claim, settings: Settings) -> None:
     file, log = settings.data / "parenting.db", settings.data / "parenting.db-wal"
     db.close()
