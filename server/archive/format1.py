@@ -17,6 +17,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, 
 
 from parenting.agent.events import Event
 from parenting.envs.level_bytes import encoding_of
+from parenting.server.archive.import_rules import first_of
 from parenting.server.errors import SetupError
 from parenting.server.notes import AGENT_KINDS
 from parenting.weights.answers_file import MOST_BYTES
@@ -158,7 +159,7 @@ def _line(path: Path, number: int, row: Mapping[str, Any]) -> Line:
     try:
         return Line.model_validate(row)
     except ValidationError as error:
-        raise SetupError(f"{path}: line {number}: {_said(error)}. Nothing was imported.") from None
+        raise SetupError(f"{path}: line {number}: {first_of(error)}. Nothing was imported.") from None
 
 
 def _event(path: Path, number: int, row: Mapping[str, Any]) -> Logged | None:
@@ -170,7 +171,7 @@ def _event(path: Path, number: int, row: Mapping[str, Any]) -> Logged | None:
         EVENT.validate_python({"kind": event.kind, **event.payload})
         return event
     except ValidationError as error:
-        raise SetupError(f"{path}: line {number}: {_said(error)}. Nothing was imported.") from None
+        raise SetupError(f"{path}: line {number}: {first_of(error)}. Nothing was imported.") from None
 
 
 def _misfits(lines: Sequence[Line]) -> Iterator[tuple[int, str]]:
@@ -189,8 +190,3 @@ def _misfits(lines: Sequence[Line]) -> Iterator[tuple[int, str]]:
             earlier = lines[line.supersedes - 1] if 0 < line.supersedes < number else None
             if earlier is None or earlier.tick != line.tick:
                 yield number, "supersedes no earlier answer to its question"
-
-
-def _said(error: ValidationError) -> str:
-    first = error.errors(include_input=False, include_url=False)[0]
-    return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"

@@ -172,6 +172,14 @@ def _wrong_values(rules: Rules, of: Mapping[str, Any]) -> Iterator[tuple[str, An
             yield name, of[name], "it is missing" if of[name] is None else str(error)
 
 
+def first_of(error: ValidationError) -> str:
+    """Return the middle of a sentence on the first value that a model refuses: its field, itself and why."""
+    first = error.errors(include_url=False)[0]
+    field, missing = ".".join(map(str, first["loc"])) or "it", first["type"] == "missing"
+    value = None if missing or not first["loc"] else first["input"]
+    return shown(field, value, "it is missing" if missing else first["msg"].removeprefix("Value error, "))
+
+
 def shown(field: str, value: Any, said: str) -> str:
     """Return the middle of a sentence on a wrong value; a long one is cut."""
     text = "" if value is None else f" {ascii(value)[:60]}:"

@@ -17,7 +17,7 @@ from pydantic import TypeAdapter, ValidationError
 from parenting._cells import whole_rows
 from parenting.server.archive.columns import Column, Row
 from parenting.server.archive.import_names import REMEDY
-from parenting.server.archive.import_rules import ROWS, shown, wrong_value
+from parenting.server.archive.import_rules import ROWS, first_of, shown, wrong_value
 from parenting.server.archive.manifest import Manifest
 from parenting.server.archive.target import MANIFEST
 from parenting.server.errors import SetupError
@@ -159,10 +159,7 @@ def _row(model: type[Row], name: str, line: str | bytes, place: str) -> Row:
     try:
         row: Any = model.model_validate_json(line)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        field, missing = ".".join(map(str, first["loc"])) or "it", first["type"] == "missing"
-        value = None if missing or not first["loc"] else first["input"]
-        raise SetupError(f"{place}: {shown(field, value, first['msg'])}. {REMEDY}") from None
+        raise SetupError(f"{place}: {first_of(error)}. {REMEDY}") from None
     if row.damaged is not None:
         raise SetupError(f"{place} was damaged in its database: {row.damaged}. Nothing was imported.")
     if (wrong := wrong_value(ROWS[name], dict(row))) is not None:
@@ -188,10 +185,7 @@ def _value(kind: type, cell: str) -> Any:
 
 
 def _said(error: Exception) -> str:
-    if isinstance(error, ValidationError):
-        first = error.errors(include_input=False, include_url=False)[0]
-        return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
-    return f"{type(error).__name__}"
+    return first_of(error) if isinstance(error, ValidationError) else type(error).__name__
 
 
 _JSON: TypeAdapter[Any] = TypeAdapter(int | float | bool)

@@ -154,11 +154,15 @@ DAMAGES: dict[str, tuple[Callable[[list[dict[str, Any]]], Any], str]] = {
     "no answers": (lambda rows: rows.clear(), "has no answers"),
     "a time beyond all": (
         lambda rows: rows[3].update(received="9999-12-31T23:59:59-14:00"),
-        "line 4: received: Value error, there is no such time in UTC",
+        "line 4: received: '9999-12-31T23:59:59-14:00': there is no such time in UTC",
     ),
-    "replays beyond all": (lambda rows: rows[3].update(replays=2**70), "line 4: replays"),
+    "replays beyond all": (
+        lambda rows: rows[3].update(replays=2**70),
+        f"line 4: replays: {2**70}: ",
+    ),
     "a tick beyond all": (lambda rows: rows[-1].update(tick=2**53), "tick"),
-    "a word for a number": (lambda rows: rows[3].update(tick="one"), "line 4: tick"),
+    "a value is missing": (lambda rows: rows[3].pop("tick"), "line 4: tick: it is missing"),
+    "a word for a number": (lambda rows: rows[3].update(tick="one"), "line 4: tick: 'one': "),
 }
 
 
