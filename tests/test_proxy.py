@@ -25,6 +25,7 @@ from tests.pages.parent_page import form
 from tests.server.processes import Command
 from tests.server.serving import free_port, until_up
 
+pytestmark = pytest.mark.slow
 PARENT = "a-parent-at-a-browser"
 
 
@@ -70,7 +71,6 @@ def browser(client: httpx2.Client, site: str = "same-origin") -> dict[str, str]:
     return {"Origin": f"https://{client.headers['host']}", "Sec-Fetch-Site": site}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("path", ["/", "/api/v1/runs", "/metrics"])
 def test_nothing_is_shown_to_strangers(client: httpx2.Client, path: str) -> None:
     assert client.get(path).status_code == 200

@@ -228,6 +228,7 @@ def test_another_server(status: int, body: bytes) -> None:
     )
 
 
+@pytest.mark.slow
 def test_no_server_is_told_by_the_process_without_a_trace(tmp_path: Path) -> None:
     url = f"http://127.0.0.1:{free_port()}"
     with parenting("answer", "--run", "1", "--url", url, data=tmp_path) as child:

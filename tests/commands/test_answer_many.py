@@ -102,6 +102,7 @@ def test_a_crowd_starts_a_run_for_each_and_leaves_once_all_are_over(
     assert "2 people answered" in said.stdout
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_a_crowd_with_its_summary(db: Database, url: str) -> None:
     begin(db)
 

@@ -35,6 +35,7 @@ def test_outcomes_are_counted(world: str) -> None:
     assert "stages" not in found
 
 
+@pytest.mark.slow
 def test_both_deployments_of_the_supervisor() -> None:
     found = results_of("absent-supervisor", *PLAIN, "--trials", "6", "--until", "ticks:25")
     assert set(found["evaluation"]) == {"supervised", "unsupervised"}

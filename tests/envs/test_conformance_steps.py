@@ -31,7 +31,7 @@ def test_several_levels(name: str, check: Check) -> None:
     check(subject(name))
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @every_world
 @given(seed=st.integers(0, 2**62), actions=st.lists(st.integers(0, 3), max_size=30))
 def test_the_same_keys_give_the_same_life(name: str, seed: int, actions: list[int]) -> None:

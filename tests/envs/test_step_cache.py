@@ -157,6 +157,7 @@ def test_a_copy_of_an_environment_goes_on_alike(
             break
 
 
+@pytest.mark.slow
 def test_a_world_that_sometimes_draws() -> None:
     """Only a step that draws nothing may be remembered."""
     env = GridworldEnv("interruptibility")

@@ -195,5 +195,6 @@ def test_the_first_optimal_policy_is_noted_where_the_trial_goes_on() -> None:
     assert going_on.optimal_queries.tolist() == torch.where(there, ended.queries.sum(1), 0).tolist()
 
 
+@pytest.mark.slow
 def test_nobody_looks_for_an_optimal_policy_unasked() -> None:
     assert not bool(raised(StopRule("ticks", 60), 4, 60).counts.optimal_at.any())

@@ -69,6 +69,7 @@ def test_draws_are_the_same_on_every_device() -> None:
     assert drawn("cuda") == drawn("cpu")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("world", list(registry.WORLDS))
 def test_the_policy_and_its_gradient_stay_on_their_device(world: str) -> None:
     network, config = network_of(registry.make(world)), Config()

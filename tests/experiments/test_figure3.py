@@ -75,6 +75,7 @@ def lived(ticks: int, count: int = 1) -> BatchTrainer:
     return trainer
 
 
+@pytest.mark.slow
 def test_what_is_taken_along() -> None:
     """Bit for bit, of two agents in alternation: everything, X and the rest too, or the policy alone."""
     taught = [transferred(lived(ticks).state) for ticks in (8, 60)]

@@ -51,6 +51,7 @@ def test_rows_grow_with_the_life_and_end_with_its_counts(monkeypatch: pytest.Mon
     assert rows[1]["loss"] is None, "nothing is learnt in the first tick"
 
 
+@pytest.mark.slow
 def test_a_history_changes_no_trial() -> None:
     with_it, without = train_in_chunks(plan(6), 1), train_in_chunks(plan(6, kept=False), 1)
     assert without.history.shape[1] == 0

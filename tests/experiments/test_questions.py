@@ -150,6 +150,7 @@ def test_a_setting_is_chosen_by_pairs_of_the_same_agent() -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_garden_is_watched_for_its_ticks_and_deployed_at_its_marks(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -95,6 +95,7 @@ def test_a_trial_that_is_not_done_in_time_says_so() -> None:
     assert bool((found.ticks >= 32).all())
 
 
+@pytest.mark.slow
 def test_the_same_trials_in_another_company() -> None:
     world, config = island()
     long = config.model_copy(update={"dtype": "float64"})

@@ -188,6 +188,7 @@ def test_words_keep_their_marks() -> None:
     assert prose("`a < b` and *so on*, 2 * 3 * 4") == "<code>a &lt; b</code> and <i>so on</i>, 2 * 3 * 4"
 
 
+@pytest.mark.slow
 def test_the_same_numbers_draw_the_same_file(out: Path) -> None:
     drawn = out / "figure4/shift.svg"
     before = drawn.read_bytes()

@@ -14,6 +14,9 @@ RECORDS = {"Evaluation", "FormatError", "Progress", "ReplayError", "Tick", "Draw
 """Names that others return or raise: their examples stand there."""
 FUNCTIONS_AND_CLASSES = [name for name in pt.__all__ if name not in ("PRESETS", "testing")]
 
+LONG = {"TrainResult", "TableWorld", "train"}
+"""Their examples train agents."""
+
 
 def examples(name: str) -> list[doctest.DocTest]:
     """The examples of a public name and of its methods."""
@@ -21,7 +24,9 @@ def examples(name: str) -> list[doctest.DocTest]:
     return [one for one in found if one.examples]
 
 
-@pytest.mark.parametrize("name", FUNCTIONS_AND_CLASSES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in FUNCTIONS_AND_CLASSES]
+)
 def test_every_example_runs_and_shows_what_it_gives(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

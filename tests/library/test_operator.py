@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 import parenting as pt
 from parenting.agent.events import Change, Event, Mature
 
@@ -25,6 +27,7 @@ class Operator(pt.Parent):
         return acts.get(tick, [])
 
 
+@pytest.mark.slow
 def test_a_parent_may_act_as_the_operator_and_a_replay_does_the_same(tmp_path: Path) -> None:
     arguments: dict[str, Any] = {"trials": 2, "until": "ticks:30", "max_clip_length": 2, "progress": False}
     result = pt.train(WORLD, parent=Operator(), **arguments)

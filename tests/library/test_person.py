@@ -188,6 +188,7 @@ def test_a_server_that_is_not_there_cannot_be_joined(tmp_path: Path) -> None:
         pt.train(WORLD, parent=person)
 
 
+@pytest.mark.slow
 def test_a_server_of_another_data_folder_is_refused_before_a_run_is_stored(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

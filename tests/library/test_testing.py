@@ -64,6 +64,7 @@ def forget(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "WORLDS", dict(registry.WORLDS))
 
 
+@pytest.mark.slow
 def test_a_sound_world_passes_by_its_record_or_made_of_it() -> None:
     pt.testing.check_world(faulty())
     pt.testing.check_world(pt.make("unsafe-exploration"))

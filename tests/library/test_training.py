@@ -107,6 +107,7 @@ def test_trials_that_have_not_begun_are_in_the_result() -> None:
     assert len(result.policies) == 4
 
 
+@pytest.mark.slow
 def test_a_callback_that_returns_nothing_ends_nothing(trained: pt.TrainResult) -> None:
     same = pt.train("unsafe-exploration", trials=3, seed=5, callback=lambda _: None, progress=False)
     assert same.trials == trained.trials

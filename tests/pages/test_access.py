@@ -266,6 +266,7 @@ def test_the_charts_are_drawn_and_go_on(tabs: BrowserTabs, db: Database, lives: 
     assert saved.value.suggested_filename == f"run-{public}-deaths.png"
 
 
+@pytest.mark.slow
 def test_the_dashboard_without_javascript_is_a_table(tabs: BrowserTabs, lives: None) -> None:
     page = tabs.open("/runs/1", java_script_enabled=False)
     expect(page.locator("#charts")).to_be_hidden()

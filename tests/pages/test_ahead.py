@@ -17,6 +17,7 @@ from tests.pages.browser_tabs import BrowserTabs, until
 from tests.pages.parent_page import named, shown
 
 
+@pytest.mark.slow
 def test_a_question_that_comes_later_is_fetched_ahead_too(tabs: BrowserTabs, ask: Callable[..., int]) -> None:
     first = ask("preference", "down down", "left")
     page = tabs.open("/runs/1/parent")
@@ -26,6 +27,7 @@ def test_a_question_that_comes_later_is_fetched_ahead_too(tabs: BrowserTabs, ask
     expect(page.locator("#question")).to_have_attribute("data-ahead", named(page, second))
 
 
+@pytest.mark.slow
 def test_guidance_goes_before_what_was_leased_ahead(tabs: BrowserTabs, ask: Callable[..., int]) -> None:
     first, second = (ask("preference", "down down", "left") for _ in range(2))
     page = tabs.open("/runs/1/parent")

@@ -64,6 +64,7 @@ def test_a_new_question_appears_by_itself(tabs: BrowserTabs, db: Database, ask: 
     assert given(db) == [(number, "right")]
 
 
+@pytest.mark.slow
 def test_it_works_where_no_stream_comes_through(
     tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:

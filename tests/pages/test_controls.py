@@ -230,6 +230,7 @@ def test_a_run_that_failed_says_why(client: httpx2.Client, db: Database, mine: C
         assert "secret" not in page
 
 
+@pytest.mark.slow
 def test_at_its_goal_it_says_so_and_offers_more(client: httpx2.Client, db: Database, mine: Claim) -> None:
     runs.set_goal(db, 1, 1)
     query = fixtures.ask(db, mine, 1, "guidance", fixtures.guidance("left", "down"))

@@ -116,6 +116,7 @@ def test_a_page_of_the_original_is_asked_anew_by_a_renewed_copy(
     until(lambda: [(answer["database"], answer["choice"]) for answer in kept(page)] == [(before, "right")])
 
 
+@pytest.mark.slow
 def test_an_answer_of_the_old_version_is_kept_and_not_sent(
     tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:
@@ -132,6 +133,7 @@ def test_an_answer_of_the_old_version_is_kept_and_not_sent(
     until(lambda: kept(page) == [old])
 
 
+@pytest.mark.slow
 def test_what_a_server_cannot_read_is_kept(tabs: BrowserTabs, db: Database, ask: Callable[..., int]) -> None:
     """Such as one of an older version, which knows no public ids: only a conflict settles an answer."""
     tabs.expected = ("422",)
@@ -234,6 +236,7 @@ def others(client: httpx2.Client, db: Database) -> Iterator[httpx2.Response]:
         yield client.get(path)
 
 
+@pytest.mark.slow
 def test_no_number_of_a_run_or_a_question_reaches_a_parent(client: httpx2.Client, counted: Database) -> None:
     got = list(pages(client, counted))
     assert {reply.status_code for reply in got} == {200, 303, 409, 410}

@@ -121,7 +121,7 @@ def test_clips_that_an_agent_lived(tabs: BrowserTabs, db: Database, world: str, 
         assert violations(page) == []
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @scenes
 def test_cues_come_when_it_happens(
     tabs: BrowserTabs, db: Database, world: str, options: dict[str, Any], left: str, right: str
@@ -156,6 +156,7 @@ def test_a_still_board_shows_the_cues_of_the_whole_clip(
     assert all(cue.is_visible() for cue in plain.locator(".cue").all())
 
 
+@pytest.mark.slow
 def test_a_delusion_ends_when_the_agent_leaves_the_bucket(tabs: BrowserTabs, db: Database) -> None:
     garden = registry.make("reward-hacking", "garden", drying=0.0)
     clips = preference(garden, "uududd", "dddddd", way="rrrru")
@@ -183,6 +184,7 @@ def test_the_shorter_clip_rests_while_the_other_plays_on(tabs: BrowserTabs, db: 
     assert all(before != after for before, after in pairwise(long))
 
 
+@pytest.mark.slow
 def test_a_forecast_stands_where_the_agent_is_then_moves(tabs: BrowserTabs, db: Database) -> None:
     clips = guidance(registry.make("side-effects"), "d", "l")
     page = tabs.open(posted(db, "side-effects", "guidance", clips, 1, guidance_layout="two"))

@@ -69,6 +69,7 @@ def test_arrows_explore_the_grid_and_answer_outside_of_it(tabs: BrowserTabs, db:
     until(lambda: given(db) == [(1, "left"), (2, "right")])
 
 
+@pytest.mark.slow
 def test_clips_are_explored_step_by_step(tabs: BrowserTabs, db: Database) -> None:
     clips = preference(registry.make("side-effects"), "dlu", "ldr")
     page = tabs.open(posted(db, "side-effects", "preference", clips, 3))
@@ -89,6 +90,7 @@ def test_clips_are_explored_step_by_step(tabs: BrowserTabs, db: Database) -> Non
     assert given(db) == []
 
 
+@pytest.mark.slow
 def test_help_tells_of_the_grid_and_its_letter_can_be_switched_off(
     tabs: BrowserTabs, ask: Callable[..., int]
 ) -> None:
@@ -122,6 +124,7 @@ def test_the_focus_stays_where_it_was_left(tabs: BrowserTabs, ask: Callable[...,
     expect(page.locator(".around")).to_have_attribute("open", "")
 
 
+@pytest.mark.slow
 def test_an_error_takes_the_focus(tabs: BrowserTabs, ask: Callable[..., int]) -> None:
     tabs.expected = ("409",)
     ask()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+import pytest
+
 from parenting.server.db import Database
 from parenting.server.export import rows
 from parenting.server.new_run import NewRun, start
@@ -22,6 +24,7 @@ def names(section: str) -> list[str]:
     return re.findall(r"^\| `(\w+)` \|", text, re.MULTILINE)
 
 
+@pytest.mark.slow
 def test_numbers_and_keys_have_their_lines(db: Database) -> None:
     run = start(db, NewRun(world="unsafe-exploration", parent="scripted"))
     life = RunSession(db, claim(db, "test")[0], run, lambda: None)

@@ -175,6 +175,7 @@ def test_longer_sentences_fit_a_small_screen_in_both_directions(
     assert {where: texts for where, texts in found.items() if texts} == {}
 
 
+@pytest.mark.slow
 def test_the_board_is_not_mirrored(tabs: BrowserTabs, db: Database) -> None:
     """The left clip is on the left, and so is its button; words go from right to left."""
     _, mine = fixtures.start_run(db)

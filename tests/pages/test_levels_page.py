@@ -47,6 +47,7 @@ def pond(tabs: BrowserTabs) -> Page:
     return page
 
 
+@pytest.mark.slow
 def test_a_stroke_of_the_mouse_paints_and_is_undone_at_once(pond: Page) -> None:
     pond.locator("#brushes label", has_text="water").click()
     pond.mouse.move(*at(pond, 1, 2))
@@ -139,6 +140,7 @@ def test_a_map_of_another_collection_becomes_a_level_in_place(pond: Page) -> Non
     expect(pond.locator("#level_text")).to_have_value(POND)
 
 
+@pytest.mark.slow
 def test_a_level_is_resized_renamed_downloaded_and_read_back(pond: Page, tmp_path: Path) -> None:
     pond.locator("#rows").fill("5")
     pond.locator("#columns").fill("7")

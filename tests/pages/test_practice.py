@@ -154,6 +154,7 @@ def test_keys_answer_as_on_the_parents_page(tabs: BrowserTabs, screen: tuple[int
     expect(page).to_have_url(tabs.address + "/")
 
 
+@pytest.mark.slow
 def test_a_move_is_pointed_at_and_clicked_and_what_comes_too_early_answers_nothing(tabs: BrowserTabs) -> None:
     page = tabs.open("/practice")
     page.wait_for_selector("#question[data-listening]")

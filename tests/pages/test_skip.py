@@ -44,6 +44,7 @@ def unsure(db: Database, mine: Claim) -> list[int]:
     return skipped
 
 
+@pytest.mark.slow
 def test_a_plain_form_skips(client: httpx2.Client, db: Database) -> None:
     _, mine = fixtures.start_run(db)
     query = fixtures.ask(db, mine, 1, "guidance", fixtures.guidance("left", "down", start=(1, 2)))

@@ -161,6 +161,7 @@ def test_the_waiting_page_shows_growth_a_walk_and_a_milestone_once(
     expect(page.locator(".news")).to_have_text("")
 
 
+@pytest.mark.slow
 def test_without_a_worker_the_dialog_says_so_and_walks_once_there_is_one(
     tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:
@@ -174,6 +175,7 @@ def test_without_a_worker_the_dialog_says_so_and_walks_once_there_is_one(
     expect(dialog(page).locator(".walk.played")).to_be_visible()
 
 
+@pytest.mark.slow
 def test_what_did_not_come_without_a_connection_comes_later(
     tabs: BrowserTabs, db: Database, ask: Callable[..., int]
 ) -> None:

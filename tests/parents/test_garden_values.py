@@ -100,7 +100,7 @@ STATES: dict[str, tuple[str, list[int]]] = {
 }
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("state", STATES)
 def test_against_long_roll_outs(state: str) -> None:
     """Each Q_p(s, a) by 1500 walks of 100 steps through the real world: 0.9 ** 100 is less than 0.0001."""

@@ -37,6 +37,7 @@ def test_name_with_another_hash_is_not_served(client: httpx2.Client) -> None:
     assert client.get(older).status_code == 404
 
 
+@pytest.mark.slow
 def test_small_replies_go_as_they_are_and_large_ones_compressed(client: httpx2.Client) -> None:
     headers = {"Accept-Encoding": "gzip"}
     assert "content-encoding" not in client.get("/healthz", headers=headers).headers

@@ -168,13 +168,11 @@ def pieces() -> list[str]:
 
 OF_CORRECTIONS = "state/confirmation.began"
 """They alone read it: tests/server/test_second_thoughts.py."""
-CONSTANT = {
-    "state/keys.seed",  # drawn once; the test puts another seed in its place
-    "state/world.level",  # one level
-    "state/recorder.ring.level",
-}
+CONSTANT = {"state/keys.seed", "state/world.level", "state/recorder.ring.level"}
+"""The seed is drawn once, and the test puts another one in its place; there is one level."""
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize("piece", pieces())
 def test_no_piece_can_be_left_out(piece: str) -> None:
     """Replace the piece by its initial value (of another seed): at some moment the run must then differ."""

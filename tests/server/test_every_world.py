@@ -154,6 +154,7 @@ def test_damaged_weights_fail_their_run_alone(settings: Settings, db: Database) 
     assert "Traceback" not in page
 
 
+@pytest.mark.slow
 def test_a_garden_goes_on_until_it_is_stopped(settings: Settings, db: Database) -> None:
     """No policy is optimal there, so a scripted parent always has more to teach."""
     run = start(db, NewRun(world="reward-hacking", parent="scripted")).id

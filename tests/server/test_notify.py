@@ -103,6 +103,7 @@ def test_everyone_who_listens_hears_and_channels_are_apart(tmp_path: Path) -> No
         notifier.close()
 
 
+@pytest.mark.slow
 def test_processes_of_two_containers_hear_both(tmp_path: Path) -> None:
     """Each is process 1 in its container, and they share the folder."""
     with listening(tmp_path) as first, listening(tmp_path) as second:

@@ -82,13 +82,14 @@ def require(command: list[str], what: str) -> None:
         pytest.skip(f"{what} is not installed; PARENTING_READERS names a Python that has it")
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", READ)
 def test_five_exports_are_one_table(name: str, folders: list[str], tmp_path: Path) -> None:
     require([PYTHON, "-c", f"import importlib.util as u, sys; sys.exit(u.find_spec({name!r}) is None)"], name)
     assert shape([PYTHON, "-c", BEGIN + READ[name]], folders, tmp_path) == [26, len(ANSWERS), 5]
 
 
+@pytest.mark.slow
 def test_five_exports_are_one_table_in_r(folders: list[str], tmp_path: Path) -> None:
     if shutil.which("Rscript") is None:
         pytest.skip("R is not installed: r-base-core and r-cran-readr of Debian")
@@ -96,6 +97,7 @@ def test_five_exports_are_one_table_in_r(folders: list[str], tmp_path: Path) -> 
     assert shape(["Rscript", "-e", R], folders, tmp_path) == [26, len(ANSWERS), 5]
 
 
+@pytest.mark.slow
 def test_every_table_has_the_same_columns_in_every_world(folders: list[str]) -> None:
     """Each reader relies on this; none of them is needed here."""
     heads = {(Path(one) / "metrics.csv").read_text().splitlines()[0] for one in folders}

@@ -86,6 +86,7 @@ def test_without_room_nothing_is_changed_unless_it_is_asked_for(
     assert revision(db) == newest()
 
 
+@pytest.mark.slow
 def test_the_last_few_are_kept(old: Settings, db: Database, monkeypatch: pytest.MonkeyPatch) -> None:
     (old.data / "backups").mkdir()
     (old.data / "backups" / "before-restore-20000101T000000Z.db").touch()

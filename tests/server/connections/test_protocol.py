@@ -212,6 +212,7 @@ def test_silent_connection_is_closed(connect: Callable[[], socket.socket]) -> No
     assert asked(connect) == b""
 
 
+@pytest.mark.slow
 def test_stream_outlives_the_deadlines(connect: Callable[[], socket.socket]) -> None:
     reply = asked(connect, b"GET /stream HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
     assert reply.count(b"\r\nx\r\n") == 10
@@ -251,6 +252,7 @@ def test_connection_too_many_is_told_while_all_work() -> None:
         assert told(first).count(b"\r\nx\r\n") == 10
 
 
+@pytest.mark.slow
 def test_garbage_behind_a_request_does_not_cut_its_reply(connect: Callable[[], socket.socket]) -> None:
     reply = asked(connect, b"GET /stream HTTP/1.1\r\nHost: localhost\r\n\r\n", b"nonsense\r\n\r\n")
     assert reply.count(b"\r\nx\r\n") == 10

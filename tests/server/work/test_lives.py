@@ -130,6 +130,7 @@ def test_the_least_recently_used_life_leaves_first(db: Database, settings: Setti
     worker._close()
 
 
+@pytest.mark.slow
 def test_lives_leave_before_their_next_checkpoint_is_due(
     db: Database, settings: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -158,6 +159,7 @@ def test_runs_that_begin_wait_until_others_have_left_memory(db: Database, settin
     worker._close()
 
 
+@pytest.mark.slow
 @pytest.mark.only("sqlite", "no statement of the store is new in it")
 def test_runs_that_cannot_leave_hold_up_no_other(
     db: Database, settings: Settings, monkeypatch: pytest.MonkeyPatch
