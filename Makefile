@@ -18,11 +18,14 @@ help: ## Print this list
 run: $(VENV)/.installed ## Install, migrate, start the web pages and a worker, open the browser
 	@$(BIN)/parenting up
 
-# The tests run after a failed check too, so that one run tells everything.
+# The tests run after a failed check too, so that one run tells everything. The documentation is checked beside them:
+# they wait for pages and processes now and then.
 test: $(VENV)/.installed-dev ## Install, then run every check and the tests of every run (ARGS="-k queue" for some)
-	@checks=passed; start=$$(date +%s); $(MAKE) --no-print-directory check || checks=failed; \
-	middle=$$(date +%s); tests=passed; $(BIN)/pytest -m "not postgresql and not faults and not slow" $(ARGS) || tests=failed; end=$$(date +%s); \
-	echo "checks: $$checks in $$((middle - start)) s, tests: $$tests in $$((end - middle)) s"; \
+	@checks=passed; start=$$(date +%s); $(MAKE) --no-print-directory --keep-going types lint || checks=failed; \
+	middle=$$(date +%s); mkdir -p build; $(MAKE) --no-print-directory docs-check > build/docs-check.log 2>&1 & docs=$$!; \
+	tests=passed; $(BIN)/pytest -m "not postgresql and not faults and not slow" $(ARGS) || tests=failed; \
+	wait $$docs || { checks=failed; cat build/docs-check.log; }; end=$$(date +%s); \
+	echo "checks: $$checks, $$((middle - start)) s before the tests; tests: $$tests in $$((end - middle)) s"; \
 	test $$checks = passed && test $$tests = passed
 
 faults: $(VENV)/.installed-dev ## Kills, power cuts, refusing stores, races, sabotage (10 minutes; ARGS for some)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 import torch
 from torch import Tensor
 
@@ -32,6 +33,7 @@ def mature(config: Config, state: AgentState) -> AgentState:
     return after.check()
 
 
+@pytest.mark.slow
 def test_a_stage_ends() -> None:
     before, _ = run_batch(WORLD, LAX, agreeable, seed=5, trials=3, ticks=80)
     recorder = before.recorder

@@ -66,6 +66,7 @@ def test_a_maze_is_connected_walled_and_has_one_goal_away_from_the_start(
         hold(found, trial, glyphs)
 
 
+@pytest.mark.slow
 @given(sizes, st.integers(0, 2**62), st.integers(0, 2**40))
 def test_any_key_and_any_size_give_a_maze(size: tuple[int, int], seed: int, tick: int) -> None:
     key = Keys(seed=torch.tensor([seed]), tick=torch.tensor([tick]))

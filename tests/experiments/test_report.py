@@ -118,6 +118,7 @@ def test_rows_of_version_0_1_are_counted_by_what_they_were_compared_with(out: Pa
     assert told_of(line) == ["1 no", "1 yes", "2 yes"]
 
 
+@pytest.mark.slow
 def test_the_pages_are_written_again_from_the_stored_trials(out: Path) -> None:
     """Verdicts come from the trials, not from what was stored of them; trials and their origin stay."""
     kept = ("command", "commits", "versions", "seconds", "workers", "asked", "config")

@@ -29,7 +29,7 @@ from tests.server.conftest import CLIPS
 from tests.server.processes import _context
 
 pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(1800, 20000))]
-KILLS, AT_ONCE = {"sqlite": length(100, 20_000), "postgresql": length(40, 6000)}, 3
+KILLS, AT_ONCE = {"sqlite": length(100, 20_000), "postgresql": length(25, 6000)}, 3
 MOMENTS = 160
 """A client dies within so many statements and commits: eight rounds."""
 SELDOM = 10

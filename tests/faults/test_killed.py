@@ -31,13 +31,9 @@ from tests.server.serving import free_port
 from tests.server.test_same_bits import GOAL, RUNS, answering, begin, check, until_heard
 
 ROUNDS = int(os.environ.get("PARENTING_KILL_ROUNDS", length(1, 10)))
-OTHERS = (("sqlite", 1), ("postgresql", 1), ("postgresql", 2))
-KILLED = [
-    ("sqlite", 2),
-    *(pytest.param(store, stages, marks=pytest.mark.slow) for store, stages in OTHERS),
-]
-"""Stores with numbers of stages. On PostgreSQL test_kills.py kills in every run."""
-KILLS = length(9, 12)
+KILLED = [("sqlite", 1), ("sqlite", 2), ("postgresql", 1), ("postgresql", 2)]
+"""Stores with numbers of stages. In every run test_kills.py kills, on both stores."""
+KILLS = 12
 """So many in a round at T = 1, and as many at T = 2."""
 KINDS = ["web", "worker", "script"]
 SOON = 0.15
@@ -128,6 +124,7 @@ def disturb(db: Database, house: House, moments: Iterator[float], rng: random.Ra
         time.sleep(0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.torture
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize(("store", "stages"), KILLED, indirect=["store"])

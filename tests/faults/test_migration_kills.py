@@ -97,6 +97,7 @@ def hold_the_copies(settings: Settings, known: Sequence[str]) -> None:
             assert dumps.check(file) > 5
 
 
+@pytest.mark.slow_on("postgresql")
 def test_migration_killed_anywhere_leaves_the_old_or_the_new_tables(
     settings: Settings, store: str, db: Database, rng: random.Random, figures: Figures
 ) -> None:

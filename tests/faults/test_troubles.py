@@ -159,6 +159,7 @@ def test_a_limit_on_the_size_of_files_is_waited_for(
         figures.count("troubles of the store", f"a limit on files for {AWAY_SECONDS:g} s")
 
 
+@pytest.mark.slow
 @pytest.mark.only("sqlite", "PostgreSQL's files are its server's own")
 def test_a_folder_that_is_read_only_is_waited_for(
     store: str, tmp_path: Path, rng: random.Random, figures: Figures

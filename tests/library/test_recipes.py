@@ -113,6 +113,7 @@ def test_the_keys_of_the_first_recipe_are_those_of_the_page() -> None:
     assert "The agent has found the optimal way." in page
 
 
+@pytest.mark.slow
 def test_raise_an_agent_by_hand(db: Database, folder: Path) -> None:
     """A script raises it here; tests/pages/test_first_light.py does so by keys in a browser."""
     run = start(db, NewRun(world="unsafe-exploration", preset="frugal", parent="scripted")).id

@@ -213,6 +213,7 @@ def test_on_a_desktop_the_question_needs_no_scrolling(tabs: BrowserTabs, lives: 
     assert brief["y"] + brief["height"] <= 800
 
 
+@pytest.mark.slow
 def test_who_wants_no_motion_gets_steps(tabs: BrowserTabs, lives: None) -> None:
     page = tabs.open("/runs/1/parent?query=2", reduced_motion="reduce")
     moving = "document.getAnimations().filter(a => a.playState === 'running').length"

@@ -61,6 +61,7 @@ def test_a_stroke_of_the_mouse_paints_and_is_undone_at_once(pond: Page) -> None:
     assert text_of(pond) == "#####\n#AW #\n# WW#\n#####\n"
 
 
+@pytest.mark.slow
 def test_keys_paint_and_the_agent_is_one(pond: Page) -> None:
     pond.locator("[data-at='1 1']").click()  # by the first brush: a wall, and the agent is gone
     for key in ("ArrowRight", "A", "ArrowRight", "Shift+W", "ArrowDown", "Delete", "ArrowLeft", "A"):

@@ -44,6 +44,7 @@ def test_english_needs_no_catalogue() -> None:
     assert (english.tag, english.scripts, english.direction) == ("en", "", "ltr")
 
 
+@pytest.mark.slow
 def test_sentences_are_said_in_the_language_in_use(languages: Languages) -> None:
     said = mark("{name} passes here."), "All else is land."
     with languages.choose("de").used():

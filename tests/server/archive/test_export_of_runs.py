@@ -57,6 +57,7 @@ def test_the_manifest_names_every_file(folder: Path) -> None:
     assert {run.settings["world"] for run in told.runs} == set(registry.WORLDS)
 
 
+@pytest.mark.slow
 def test_an_answer_tells_what_supersedes_it_and_whether_it_is_in_x(folder: Path, db: Database) -> None:
     mine = [row for row in lines(folder, "answers.jsonl") if row["run"] == get_run(db, 1).public_id]
     told = [

@@ -102,6 +102,7 @@ def test_a_row_that_stays_locked_is_busy(
     other.close()
 
 
+@pytest.mark.slow
 def test_who_stands_still_in_a_write_holds_up_nobody_for_long(
     db: Database, settings: Settings, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
