@@ -33,7 +33,6 @@ def mature(config: Config, state: AgentState) -> AgentState:
     return after.check()
 
 
-@pytest.mark.slow
 def test_a_stage_ends() -> None:
     before, _ = run_batch(WORLD, LAX, agreeable, seed=5, trials=3, ticks=80)
     recorder = before.recorder
