@@ -78,6 +78,7 @@ def test_miniature_is_allowed(miniature: Path) -> None:
     assert result.returncode == 0, result.stdout + result.stderr
 
 
+@pytest.mark.slow_after(7)
 @pytest.mark.parametrize(
     ("file", "line", "contract"),
     [

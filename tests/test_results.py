@@ -198,6 +198,7 @@ def test_only_rows_that_are_compared_have_a_verdict(name: str) -> None:
             assert one["agrees"] is None, one["what"]
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("name", NAMES)
 def test_the_rows_are_those_that_the_stored_trials_give(name: str) -> None:
     """So nobody has edited a verdict by hand, and no program has changed since."""

@@ -206,6 +206,7 @@ def test_wrong_addresses(url: str) -> None:
     assert said.stderr.endswith("Write it as http://localhost:8765; `parenting up` says which it is.\n")
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(("status", "body"), [(200, b"<p>Hello"), (404, b"{}"), (200, b"[]"), (301, b"")])
 def test_another_server(status: int, body: bytes) -> None:
     class Other(BaseHTTPRequestHandler):

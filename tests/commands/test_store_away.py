@@ -84,6 +84,7 @@ def said_by(command: str) -> str:
     return said
 
 
+@pytest.mark.slow_after(30)
 @pytest.mark.parametrize("damage", DAMAGES)
 @pytest.mark.parametrize("command", USED)
 def test_a_damaged_file(settings: Settings, command: str, damage: Callable[[Path], None]) -> None:

@@ -93,6 +93,7 @@ def test_the_policy_and_its_gradient_stay_on_their_device(world: str) -> None:
         differentiate(network, config, parameters, rows._replace(mu=torch.zeros(trials, entries, 2)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stream", list(Stream))
 def test_random_streams_stay_on_their_device(stream: Stream) -> None:
     assert keys(0, 3, "meta").next().uniform(stream, 4).device.type == "meta"

@@ -54,6 +54,7 @@ def test_earlier_answers_are_trained_on(export: Path) -> None:
     assert learnt[0] > learnt[1]
 
 
+@pytest.mark.slow
 def test_what_does_not_fit_is_told_with_its_field(policy: pt.Policy, export: Path, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="world: The policy is of the world unsafe-exploration"):
         pt.train("side-effects", from_policy=policy, progress=False)

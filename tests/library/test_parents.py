@@ -25,6 +25,7 @@ class StayDry(pt.Parent):
         return {(0, 0): "either", (0, 1): "left", (1, 0): "right", (1, 1): "neither"}[left, right]
 
 
+@pytest.mark.slow
 def test_ones_own_parent_trains_agents_that_stay_dry() -> None:
     parent = StayDry()
     result = pt.train(WORLD, trials=3, parent=parent, until="queries:25", progress=False)

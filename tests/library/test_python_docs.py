@@ -58,6 +58,7 @@ def empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("title", [title for title in SECTIONS if title != PERSON])
 def test_a_section_runs_and_prints_what_it_shows(title: str, empty_folder: Path) -> None:
     if title == "Stable-Baselines3" and importlib.util.find_spec("stable_baselines3") is None:

@@ -95,6 +95,7 @@ def test_guidance_of_a_run_with_two_boards_keeps_them(client: httpx2.Client, db:
     assert "meeting" not in page
 
 
+@pytest.mark.slow
 def test_page_by_page(client: httpx2.Client, db: Database, mine: Claim) -> None:
     for tick in range(1, 2 * PAGE + 4):
         answered(db, mine, tick, "left")

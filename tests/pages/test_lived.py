@@ -60,6 +60,7 @@ def test_clips_of_several_steps_are_among_them(world: str, level: str) -> None:
     assert max(lengths) > 2
 
 
+@pytest.mark.slow_after(2)
 @every_level
 def test_the_drawing_holds_every_frame(world: str, level: str) -> None:
     """The agent's way, the tiles that change, and each cue at a frame that there is, within the view."""

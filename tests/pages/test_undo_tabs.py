@@ -124,6 +124,7 @@ def test_an_answer_whose_tab_was_closed_before_the_reply_is_the_last(
     until(lambda: stored(db) == [("right", True), ("left", False)])
 
 
+@pytest.mark.slow
 def test_a_page_that_comes_back_looks_again(tabs: BrowserTabs, db: Database, ask: Callable[..., int]) -> None:
     """While the browser kept it for the button *Back*, it heard nothing of other tabs."""
     first, second = ask(), ask()

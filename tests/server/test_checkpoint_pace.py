@@ -39,6 +39,7 @@ def lived(tick: float, wait: float, took: float, size: int, ticks: int) -> tuple
     return tick * ticks, spent, most
 
 
+@pytest.mark.slow_after(6)
 @pytest.mark.parametrize("size", [200_000, 100_000_000, 10_000_000_000])
 @pytest.mark.parametrize("took", [0.02, 0.5, 30.0])
 @pytest.mark.parametrize("tick", [0.003, 0.4])

@@ -78,6 +78,7 @@ def test_nesting_of_ten_thousand_is_refused(client: httpx2.Client, bracket: str)
         assert refused(client.post("/api/v1/runs", content=body, headers=JSON))
 
 
+@pytest.mark.slow_after(3)
 @pytest.mark.parametrize("cookie", JUNK, ids=range(len(JUNK)))
 def test_junk_cookies_keep_nobody_out(client: httpx2.Client, run: object, cookie: str) -> None:
     sent = {b"Cookie": cookie.encode("latin-1")}

@@ -17,6 +17,7 @@ PATHS = bare_app().openapi()["paths"]
 ROUTES = [(method, path) for path, found in PATHS.items() for method in found if path.startswith("/api/")]
 
 
+@pytest.mark.slow_after(20)
 @pytest.mark.parametrize(("method", "path"), ROUTES)
 def test_an_unknown_parameter_is_refused(
     client: httpx2.Client, mine: Claim, guidance: int, method: str, path: str
@@ -27,6 +28,7 @@ def test_an_unknown_parameter_is_refused(
     assert "nonsense=1" not in str(refused)
 
 
+@pytest.mark.slow_after(30)
 @pytest.mark.parametrize("written", ["1_0", " 1", "+1", "1\n", "1.0", "\u0661", ""])
 @pytest.mark.parametrize(
     ("path", "name"),

@@ -55,6 +55,7 @@ def policy(states: KnownStates, parameters: torch.Tensor) -> bytes:
     return bytes(sweep.policies[1].known)
 
 
+@pytest.mark.slow
 def test_what_is_stored_is_what_the_agent_would_do_and_has_done(db: Database, client: httpx2.Client) -> None:
     life = begin(db, "side-effects")
     moves = live(life, 25)

@@ -33,6 +33,7 @@ def lived(db: Database, world: str, ticks: int, **config: Any) -> RunSession:
     return life
 
 
+@pytest.mark.slow
 def test_a_state_is_told_as_it_is_stored(db: Database) -> None:
     life = lived(db, "side-effects", 25)
     number = life.claim.run_id
