@@ -31,12 +31,13 @@ pytestmark = [
     pytest.mark.timeout(length(1800, 20000)),
     pytest.mark.only("sqlite", "PostgreSQL has checksums of its own for its pages"),
 ]
-FLIPS = length(20, 20_000)
+FLIPS = length(80, 20_000)
 ANSWERS = 24
 SAID = {"refused at the start", "the damage is said, the rest goes on"}
 GROUP = "flips of bits in the files of a database"
 
 
+@pytest.mark.slow
 def test_flipped_bits_never_change_an_answer_in_silence(
     settings: Settings, db: Database, rng: random.Random, figures: Figures
 ) -> None:

@@ -23,7 +23,7 @@ from tests.server.raising import ISLAND
 
 pytestmark = [pytest.mark.torture, pytest.mark.timeout(length(1800, 6000))]
 RUNS, PARENTS, CROWD = 2, 2, 8
-KILLS = {"sqlite": length(25, 3000), "postgresql": length(9, 600)}
+KILLS = {"sqlite": length(15, 3000), "postgresql": length(9, 600)}
 SAMPLED = 6
 """Points that a run of CI tries on PostgreSQL; on SQLite it tries all."""
 WEBS, WORKERS = length((1, 1), (2, 3))

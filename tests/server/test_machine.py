@@ -115,7 +115,7 @@ def test_the_other_way_and_killed_again_within_the_record(db: Database, settings
     assert verify(db, RUN).x is None
 
 
-@pytest.mark.slow_on("postgresql")
+@pytest.mark.slow
 @pytest.mark.faults
 def test_recorded_questions_stand_where_the_agent_would_ask_others(
     db: Database, followed: list[int], monkeypatch: pytest.MonkeyPatch
