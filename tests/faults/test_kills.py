@@ -134,7 +134,8 @@ def test_killed_at_random_moments(
             house.keep()
             house.until_told(1)
         house.move_out()
-        assert len(figures.of("SIGKILLs at random moments")) >= 3, "all kills fell into the same places"
+        places = len(figures.of("SIGKILLs at random moments"))
+        assert places >= (3 if KILLS[store] > 10 else 2), "all kills fell into the same places"
         hold_to_the_promises(house, runs)
 
 
